@@ -1,0 +1,45 @@
+# The two commands that matter: `make demo` and `make test`. Both set everything up by themselves.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+# Each process computes in its own threads; waiting ones must not burn the other pool's time.
+export OMP_WAIT_POLICY := passive
+export GOMP_SPINCOUNT := 0
+
+.PHONY: help setup demo test lint smoke benchmark doctor clean
+
+help: ## list the commands
+	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 14
+
+setup: $(VENV)/.complete ## virtual environment, pinned dependencies, libLLVM
+
+$(VENV)/.complete: pyproject.toml constraints.txt tools/setup.sh
+	@PYTHON=$(PYTHON) VENV=$(VENV) sh tools/setup.sh
+	@touch $@
+
+demo: setup ## train exploration and uniform sampling, compare them: 15 minutes
+	@$(BIN)/python -m ngi.train -m +sweeps=demo
+	@$(BIN)/python -m analysis.report outputs/demo
+
+test: setup lint smoke ## linter, type checker, all tests, smoke run on real renders
+	@$(BIN)/python -m pytest -q
+
+lint: setup
+	@$(BIN)/ruff check .
+	@$(BIN)/ruff format --check .
+	@$(BIN)/mypy
+
+smoke: setup
+	@rm -rf outputs/smoke
+	@$(BIN)/python -m ngi.train -m +sweeps=smoke
+	@$(BIN)/python -m analysis.report outputs/smoke
+
+benchmark: setup ## speed as ratios, with the machine's own limits measured beside
+	@$(BIN)/python -m ngi.benchmark
+
+doctor: setup ## what this machine has, and how to get what is missing
+	@$(BIN)/python -m ngi.doctor
+
+clean: ## delete the virtual environment; results stay
+	rm -rf $(VENV)

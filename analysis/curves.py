@@ -1,0 +1,48 @@
+"""Error against run time, brought to common times so that seeds can be averaged."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.runs import Run
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A method's error over time. All arrays have shape [times].
+
+    seconds: run time without evaluations; mean: over the seeds; low, high: their range; n: seeds
+    """
+
+    seconds: np.ndarray
+    mean: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    n: int
+
+
+def error_curve(runs: Sequence[Run], key: str) -> Curve | None:
+    """The column `key` of metrics.csv over the runs of one scene and method.
+
+    The seeds are evaluated at slightly different times: the curve has the first run's, as far as
+    all runs cover them, and the others are interpolated linearly. None where a run has no such
+    values.
+    """
+    series = []
+    for run in runs:
+        if key not in run.history:
+            return None
+        finite = run.history[["run_seconds", key]].dropna().sort_values("run_seconds")
+        if finite.empty:
+            return None
+        series.append(finite.to_numpy(dtype=float))
+    start = max(points[0, 0] for points in series)
+    end = min(points[-1, 0] for points in series)
+    if start > end:
+        return None
+    times = np.unique(series[0][:, 0].clip(start, end))
+    values = np.stack([np.interp(times, points[:, 0], points[:, 1]) for points in series])
+    return Curve(times, values.mean(axis=0), values.min(axis=0), values.max(axis=0), len(runs))

@@ -1,0 +1,59 @@
+"""Tables as LaTeX in the manner of the booktabs package."""
+
+from __future__ import annotations
+
+from itertools import groupby
+
+from analysis.tables import Cell, Table
+
+_SPECIAL = {
+    "\\": r"\textbackslash{}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "±": r"$\pm$",
+    "–": "--",
+    "ε": r"$\varepsilon$",
+    **{sign: f"\\{sign}" for sign in "&%$#_{}"},
+}
+
+
+def escape(text: str) -> str:
+    """Text as LaTeX prints it literally."""
+    return "".join(_SPECIAL.get(sign, sign) for sign in text)
+
+
+def to_latex(table: Table) -> str:
+    """A `table` environment for documents that use the package booktabs.
+
+    Column names that share their first word ('hard MAPE', 'hard MAE') get it as a common heading;
+    a rule separates the scenes.
+    """
+    alignment = "l" * table.labels + "r" * (len(table.columns) - table.labels)
+    lines = [r"\begin{table}", rf"\caption{{{escape(table.title)}}}", r"\centering"]
+    lines += [rf"\begin{{tabular}}{{{alignment}}}", r"\toprule", *_heading(table.columns)]
+    for _, rows in groupby(table.rows, key=lambda row: row[0].text):
+        lines.append(r"\midrule")
+        lines += [" & ".join(_cell(cell) for cell in row) + r" \\" for row in rows]
+    lines += [r"\bottomrule", r"\end{tabular}", r"\end{table}"]
+    return "\n".join(lines)
+
+
+def _cell(cell: Cell) -> str:
+    return rf"\textbf{{{escape(cell.text)}}}" if cell.best else escape(cell.text)
+
+
+def _heading(columns: tuple[str, ...]) -> list[str]:
+    split = [column.split(" ", 1) if " " in column else ["", column] for column in columns]
+    groups = [(name, len(list(group))) for name, group in groupby(first for first, _ in split)]
+    if not any(name and size > 1 for name, size in groups):
+        return [" & ".join(escape(column) for column in columns) + r" \\"]
+    cells, rules, position = [], [], 1
+    for name, size in groups:
+        if name:
+            cells.append(rf"\multicolumn{{{size}}}{{c}}{{{escape(name)}}}")
+            rules.append(rf"\cmidrule(lr){{{position}-{position + size - 1}}}")
+        else:
+            cells += [""] * size
+        position += size
+    names = " & ".join(escape(second) for _, second in split)
+    return [" & ".join(cells) + r" \\", "".join(rules), names + r" \\"]

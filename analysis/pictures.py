@@ -1,0 +1,158 @@
+"""Pictures side by side: the reference, then each method's prediction and its error map."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+
+from analysis.methods import methods_in_order
+from analysis.runs import Run
+
+PANEL = 256
+"""Pixels that smaller pictures are enlarged to, by a whole factor."""
+
+MOST_DIFFERENT = 3
+"""Frames in a scene's overview."""
+
+_MARGIN = 12
+_LINE = 20
+_BAR = (200, 12)
+
+
+@dataclass(frozen=True)
+class _FrameOfMethods:
+    """One hard frame, and per method the run that predicted it."""
+
+    index: int
+    runs: Mapping[str, Run]
+
+    def mape(self, method: str) -> float:
+        return _frame_mapes(self.runs[method])[self.index]
+
+    @property
+    def spread(self) -> float:
+        """How much the methods differ: largest MAPE minus smallest."""
+        values = [self.mape(method) for method in self.runs]
+        return max(values) - min(values)
+
+
+def write_comparisons(runs: Sequence[Run], folder: Path) -> tuple[list[Path], list[str]]:
+    """Writes comparison sheets of the hard frames of every scene.
+
+    Per scene `<scene>.png`, the frames in which the methods' MAPEs differ most, and
+    `<scene>/hard_<index>.png` for all of them; every method shows its lowest seed. Returns what
+    was written, overviews and folders, and a warning per scene whose pictures are missing.
+    """
+    written, warnings = [], []
+    for scene in sorted({run.scene for run in runs}):
+        of_scene = [run for run in runs if run.scene == scene]
+        chosen = {
+            method: min((r for r in of_scene if r.method == method), key=lambda r: r.seed)
+            for method in methods_in_order(of_scene)
+        }
+        indices = sorted(set.intersection(*(set(_frame_mapes(run)) for run in chosen.values())))
+        frames = [_FrameOfMethods(index, chosen) for index in indices]
+        telling = sorted(frames, key=lambda frame: -frame.spread)[:MOST_DIFFERENT]
+        overview, every = folder / f"{scene}.png", folder / scene
+        try:
+            every.mkdir(parents=True, exist_ok=True)
+            for frame in frames:
+                _sheet([frame]).save(every / f"hard_{frame.index:02d}.png")
+            _sheet(telling).save(overview)
+        except OSError as error:
+            warnings.append(f"no comparison pictures of {scene}: {error}")
+            continue
+        written += [overview, every]
+    return written, warnings
+
+
+def _frame_mapes(run: Run) -> dict[int, float]:
+    frames = run.result["frames"]
+    return {frame["index"]: frame["mape"] for frame in frames if frame["set"] == "hard"}
+
+
+def _sheet(frames: Sequence[_FrameOfMethods]) -> Image.Image:
+    """A row per frame, and below them what the error maps' colours mean."""
+    rows = [_row(frame) for frame in frames]
+    legend_top = sum(row.height for row in rows) + _MARGIN
+    sheet = Image.new(
+        "RGB", (max(row.width for row in rows), legend_top + _LINE + _MARGIN), "white"
+    )
+    top = 0
+    for row in rows:
+        sheet.paste(row, (0, top))
+        top += row.height
+    first = frames[0]
+    _draw_error_scale(sheet, next(iter(first.runs.values())), first.index, legend_top)
+    return sheet
+
+
+def _row(frame: _FrameOfMethods) -> Image.Image:
+    panels: list[tuple[str, Image.Image]] = []
+    for method, run in frame.runs.items():
+        if not panels:
+            label = f"reference, hard frame {frame.index}"
+            panels.append((label, _picture(run, frame.index, "reference")))
+        prediction = _picture(run, frame.index, "prediction")
+        panels.append((f"{method} (seed {run.seed})", prediction))
+        error = _picture(run, frame.index, "error")
+        panels.append((f"its error, MAPE {frame.mape(method):.3f}", error))
+    width, height = panels[0][1].size
+    row = Image.new(
+        "RGB", (_MARGIN + (width + _MARGIN) * len(panels), _MARGIN + _LINE + height), "white"
+    )
+    draw = ImageDraw.Draw(row)
+    for column, (label, picture) in enumerate(panels):
+        left = _MARGIN + column * (width + _MARGIN)
+        draw.text((left, _MARGIN), _fitted(label, width), fill="black", font=_font(14))
+        row.paste(picture, (left, _MARGIN + _LINE))
+    return row
+
+
+def _fitted(label: str, width: int) -> str:
+    """The label, cut with an ellipsis where it is wider than its picture."""
+    font = _font(14)
+    while len(label) > 1 and font.getlength(label) > width:
+        label = label.removesuffix("…")[:-1] + "…"
+    return label
+
+
+def _picture(run: Run, index: int, kind: str) -> Image.Image:
+    with Image.open(_file(run, index, kind)) as file:
+        picture = file.convert("RGB")
+    factor = max(1, PANEL // picture.height)
+    size = (picture.width * factor, picture.height * factor)
+    return picture.resize(size, Image.Resampling.NEAREST)
+
+
+def _draw_error_scale(sheet: Image.Image, run: Run, index: int, top: int) -> None:
+    """A colour bar and what it stands for, as the error map's file says."""
+    path = _file(run, index, "error")
+    with Image.open(path) as file:
+        said = dict(file.info)
+    try:
+        scale, name, maximum = said["scale"], said["colour_map"], said["maximum"]
+    except KeyError as error:
+        raise OSError(f"{path} does not say its {error}") from error
+    width, height = _BAR
+    levels = np.tile(np.linspace(0, 1, width), (height, 1))
+    colours = np.ascontiguousarray(matplotlib.colormaps[name](levels, bytes=True)[..., :3])
+    draw, font, middle = ImageDraw.Draw(sheet), _font(13), top + height // 2
+    draw.text((_MARGIN, middle), "0", fill="black", font=font, anchor="lm")
+    sheet.paste(Image.fromarray(colours), (_MARGIN + 14, top))
+    text = f"≥ {maximum}     error: {scale}"
+    draw.text((_MARGIN + 20 + width, middle), text, fill="black", font=font, anchor="lm")
+
+
+def _file(run: Run, index: int, kind: str) -> Path:
+    return run.folder / "pictures" / f"hard_{index:02d}_{kind}.png"
+
+
+def _font(size: int) -> ImageFont.FreeTypeFont:
+    file = Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
+    return ImageFont.truetype(str(file), size)

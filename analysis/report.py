@@ -1,0 +1,133 @@
+"""Tables, plots and pictures of every run below a folder: `python -m analysis.report FOLDER`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from analysis.latex import to_latex
+from analysis.methods import differing_fields, methods_in_order, name_methods
+from analysis.pictures import write_comparisons
+from analysis.plots import method_styles, write_error_curves
+from analysis.runs import SETS, Run, check_comparable, find_runs
+from analysis.summary import REFERENCE_NOISE, Comparison, Summary, compare, summarise, to_frame
+from analysis.tables import (
+    Table,
+    comparison_table,
+    cost_table,
+    error_table,
+    to_markdown,
+    to_terminal,
+    worst_table,
+)
+
+
+@dataclass(frozen=True)
+class Report:
+    """What was written: the text for the terminal, the files, and warnings."""
+
+    text: str
+    files: list[Path]
+    warnings: list[str]
+
+
+def write_report(folder: Path, output: Path) -> Report:
+    """Reads every run below `folder` and writes tables, plots and pictures into `output`.
+
+    Raises ValueError where there is no run or the runs cannot be compared; nothing is written
+    then.
+    """
+    runs, warnings = find_runs(folder)
+    runs = name_methods(runs)
+    check_comparable(runs)
+    summaries = summarise(runs)
+    comparisons = compare(summaries)
+    output.mkdir(parents=True, exist_ok=True)
+    files = _write_tables(runs, summaries, comparisons, output)
+    files += write_error_curves(runs, method_styles(runs), output)
+    overviews, missing = write_comparisons(runs, output / "pictures")
+    return Report(_text(runs, summaries, comparisons), files + overviews, warnings + missing)
+
+
+def _write_tables(
+    runs: Sequence[Run],
+    summaries: Sequence[Summary],
+    comparisons: Sequence[Comparison],
+    output: Path,
+) -> list[Path]:
+    tables = [error_table(summaries), worst_table(summaries), cost_table(summaries)]
+    if comparisons:
+        tables.append(comparison_table(comparisons))
+    csv, markdown, latex = (output / f"results.{suffix}" for suffix in ("csv", "md", "tex"))
+    to_frame(summaries).to_csv(csv, index=False)
+    notes = "\n".join(f"- {note}" for note in _notes(runs))
+    markdown.write_text("\n\n".join([*map(to_markdown, tables), notes]) + "\n")
+    latex.write_text("\n\n".join(map(to_latex, tables)) + "\n")
+    return [csv, markdown, latex]
+
+
+def _text(
+    runs: Sequence[Run], summaries: Sequence[Summary], comparisons: Sequence[Comparison]
+) -> str:
+    """The same tables for the terminal, a set of frames at a time so that they fit its width."""
+    tables: list[Table] = []
+    for name in SETS:
+        tables += [error_table(summaries, [name]), worst_table(summaries, [name])]
+        if comparisons:
+            tables.append(comparison_table(comparisons, [name]))
+    tables.append(cost_table(summaries))
+    return "\n\n".join([*map(to_terminal, tables), "\n".join(_notes(runs))])
+
+
+def _notes(runs: Sequence[Run]) -> list[str]:
+    """How to read the tables, and how the methods differ."""
+    protocol = runs[0].result["protocol"]
+    notes = [
+        f"Protocol {protocol['name']} ({protocol['identity']}). Lower is better; a scene's "
+        "lowest mean is marked.",
+        "±: half width of the 95 % interval of the mean over n seeds (Student's t); "
+        "none for one seed.",
+        f"{REFERENCE_NOISE}: what a perfect prediction would score against these references.",
+    ]
+    fields = differing_fields(runs)
+    for method in methods_in_order(runs):
+        label = next(run.label for run in runs if run.method == method)
+        if fields:
+            notes.append(f"{method}: " + ", ".join(f"{field} {label[field]}" for field in fields))
+    reasons = {run.result["lpips_note"] for run in runs if run.result.get("lpips_note")}
+    notes += [f"LPIPS is empty: {reason}" for reason in sorted(reasons)]
+    return notes
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry point; returns the exit status, 1 where there is nothing that can be reported."""
+    parser = argparse.ArgumentParser(
+        prog="python -m analysis.report",
+        description="Compares every finished run below FOLDER: results.csv, .md and .tex (mean and "
+        "95 %% interval over seeds), error against run time (.png, .svg), and comparison pictures "
+        "of the hard frames. Runs of different protocols, scene files or references are refused.",
+    )
+    parser.add_argument("folder", metavar="FOLDER", type=Path, help="searched for result.json")
+    parser.add_argument(
+        "--output", metavar="PATH", type=Path, help="where to write; by default FOLDER/report"
+    )
+    arguments = parser.parse_args(argv)
+    try:
+        report = write_report(arguments.folder, arguments.output or arguments.folder / "report")
+    except ValueError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    print(report.text)
+    for warning in report.warnings:
+        print(f"warning: {warning}", file=sys.stderr)
+    print("\nWritten:")
+    for file in report.files:
+        print(f"  {file}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

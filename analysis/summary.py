@@ -1,0 +1,132 @@
+"""Runs of one scene and method, averaged over their seeds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import pandas as pd
+
+from analysis.methods import is_baseline, methods_in_order
+from analysis.runs import DISTINCTIONS, METRICS, SETS, Run
+from analysis.statistics import Estimate, estimate, paired_difference
+
+REFERENCE_NOISE = "reference noise"
+"""Name of the row that says what a perfect prediction would score."""
+
+COSTS = ("steps", "patches_traced", "paths_traced", "run_seconds")
+METRIC_KEYS = tuple(f"{name}_{metric}" for name in SETS for metric in METRICS)
+
+
+@dataclass(frozen=True)
+class Summary:
+    """One row of the results: a scene, a method, and its values averaged over the seeds.
+
+    values: 'hard_mape', 'hard_mape_worst5', …, and the costs; None where runs have no such value.
+    The reference noise is a summary without runs that has the means' keys only.
+    """
+
+    scene: str
+    method: str
+    runs: tuple[Run, ...]
+    values: dict[str, Estimate | None]
+
+    @property
+    def is_method(self) -> bool:
+        return bool(self.runs)
+
+
+def summarise(runs: Sequence[Run]) -> list[Summary]:
+    """One summary per scene and method, and per scene one of the reference noise, in order."""
+    summaries = []
+    for scene in sorted({run.scene for run in runs}):
+        of_scene = [run for run in runs if run.scene == scene]
+        for method in methods_in_order(of_scene):
+            group = tuple(run for run in of_scene if run.method == method)
+            summaries.append(Summary(scene, method, group, _values(group)))
+        summaries.append(_reference_noise(of_scene))
+    return summaries
+
+
+def _values(runs: Sequence[Run]) -> dict[str, Estimate | None]:
+    values: dict[str, Estimate | None] = {}
+    for set_name in SETS:
+        for metric in METRICS:
+            for statistic, suffix in (("mean", ""), ("worst5", "_worst5")):
+                found = [run.metric(set_name, metric, statistic) for run in runs]
+                numbers = [value for value in found if value is not None]
+                # Runs with and without LPIPS weights are not averaged as if n were the same.
+                complete = len(numbers) == len(runs)
+                values[f"{set_name}_{metric}{suffix}"] = estimate(numbers) if complete else None
+    for cost in COSTS:
+        values[cost] = estimate([float(run.result[cost]) for run in runs])
+    return values
+
+
+def _reference_noise(runs: Sequence[Run]) -> Summary:
+    """The floors; they belong to the references, which all runs of a scene share."""
+    values: dict[str, Estimate | None] = {}
+    for set_name in SETS:
+        for metric in METRICS:
+            known = [run.metric(set_name, metric, "floor") for run in runs]
+            floor = next((value for value in known if value is not None), None)
+            values[f"{set_name}_{metric}"] = None if floor is None else estimate([floor])
+    return Summary(runs[0].scene, REFERENCE_NOISE, (), values)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Two methods of one scene, paired by seed.
+
+    differences: per metric (other - baseline) / baseline; None without shared seeds or values.
+    """
+
+    scene: str
+    baseline: str
+    other: str
+    differences: dict[str, Estimate | None]
+
+
+def compare(summaries: Sequence[Summary]) -> list[Comparison]:
+    """A comparison for every scene that was run with exactly two methods."""
+    comparisons = []
+    for scene in dict.fromkeys(summary.scene for summary in summaries):
+        pair = [summary for summary in summaries if summary.scene == scene and summary.is_method]
+        if len(pair) != 2:
+            continue
+        pair.sort(key=lambda summary: not is_baseline(summary.method))
+        differences = {
+            f"{set_name}_{metric}": paired_difference(
+                *(_by_seed(summary.runs, set_name, metric) for summary in pair)
+            )
+            for set_name in SETS
+            for metric in METRICS
+        }
+        if any(differences.values()):
+            comparisons.append(Comparison(scene, pair[0].method, pair[1].method, differences))
+    return comparisons
+
+
+def _by_seed(runs: Sequence[Run], set_name: str, metric: str) -> dict[int, float]:
+    values = {run.seed: run.metric(set_name, metric) for run in runs}
+    return {seed: value for seed, value in values.items() if value is not None}
+
+
+def to_frame(summaries: Sequence[Summary]) -> pd.DataFrame:
+    """Every number with its interval, one row per scene and method, for results.csv."""
+    rows = []
+    for summary in summaries:
+        row: dict[str, object] = {
+            "scene": summary.scene,
+            "method": summary.method,
+            "seeds": " ".join(str(run.seed) for run in summary.runs),
+        }
+        for key, value in summary.values.items():
+            row[key] = None if value is None else value.mean
+            row[f"{key}_interval"] = None if value is None else value.half_width
+        if summary.runs:
+            first = summary.runs[0]
+            row |= {field: first.label[field] for field in ("sampler", *DISTINCTIONS)}
+            row["protocol"] = first.result["protocol"]["name"]
+        rows.append(row)
+    return pd.DataFrame(rows)

@@ -1,0 +1,155 @@
+"""Says what this machine has for rendering and training, and how to get what is missing.
+
+`python -m ngi.doctor`. Exit status 0 when the program can run here, 1 when it can't.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from ngi.learn.result import LIBRARIES
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One line of the report.
+
+    required: the program can not run without it
+    remedy: the command or step that brings it; empty where it is there
+    """
+
+    name: str
+    present: bool
+    detail: str
+    remedy: str = ""
+    required: bool = False
+
+
+def python() -> Finding:
+    current = platform.python_version()
+    return Finding(
+        "Python", sys.version_info >= (3, 11), current, "install Python 3.11 or newer", True
+    )
+
+
+def libraries() -> Finding:
+    missing, found = [], []
+    for name in LIBRARIES:
+        try:
+            found.append(f"{name} {version(name)}")
+        except PackageNotFoundError:
+            missing.append(name)
+    detail = ", ".join(found) + (f"; missing: {', '.join(missing)}" if missing else "")
+    return Finding("libraries", not missing, detail, "make setup", True)
+
+
+def torch_device() -> Finding:
+    import torch
+
+    threads = f"{torch.get_num_threads()} threads of {os.cpu_count()} cores"
+    if torch.cuda.is_available():
+        return Finding("PyTorch on a GPU", True, torch.cuda.get_device_name())
+    build = "a CUDA build that sees no GPU" if torch.version.cuda else "a CPU build"
+    return Finding(
+        "PyTorch on a GPU", False, f"{build}; the CPU is used ({threads})",
+        "nothing, if there is no NVIDIA GPU; else install its driver and a CUDA build of PyTorch",
+    )  # fmt: skip
+
+
+def llvm() -> Finding:
+    from ngi.llvm import INSTALL_COMMAND, candidates, find_llvm
+
+    chosen = find_llvm()
+    if chosen is not None:
+        return Finding("libLLVM (fast CPU renderer)", True, f"{chosen.version}, {chosen.path}")
+    rejected = "; ".join(f"{c.path}: {c.verdict}" for c in candidates()) or "none found"
+    return Finding("libLLVM (fast CPU renderer)", False, rejected, INSTALL_COMMAND)
+
+
+def optix() -> Finding:
+    """The NVIDIA driver brings OptiX; without a driver there is no CUDA backend."""
+    name = "NVIDIA driver and OptiX (GPU renderer)"
+    tool = shutil.which("nvidia-smi")
+    if tool is None:
+        return Finding(
+            name, False, "no NVIDIA driver", "install the NVIDIA driver, if there is a GPU"
+        )
+    query = [tool, "--query-gpu=name,driver_version", "--format=csv,noheader"]
+    answer = subprocess.run(query, capture_output=True, text=True, check=False)
+    if answer.returncode != 0:
+        return Finding(
+            name, False, answer.stdout.strip() or answer.stderr.strip(), "repair the driver"
+        )
+    places = ("/usr/lib", "/usr/lib64", "/usr/lib/x86_64-linux-gnu", "/usr/local/nvidia/lib64")
+    library = next((p for d in places for p in Path(d).glob("libnvoptix.so*")), None)
+    detail = answer.stdout.strip()
+    if library is None:
+        return Finding(
+            name, False, f"{detail}, but no libnvoptix.so", "install the driver's OptiX package: "
+            "apt-get install libnvoptix1"
+        )  # fmt: skip
+    return Finding(name, True, f"{detail}, {library}")
+
+
+def renderer() -> Finding:
+    """Starts the backend that `renderer.backend=auto` would take."""
+    code = "from ngi.backend import activate; print(activate('auto'))"
+    answer = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False
+    )
+    if answer.returncode != 0:
+        last = (answer.stderr.strip().splitlines() or ["no message"])[-1]
+        return Finding("Mitsuba", False, last, "make setup", True)
+    return Finding("Mitsuba", True, f"renders with {answer.stdout.strip().splitlines()[-1]}")
+
+
+def lpips_weights() -> Finding:
+    from ngi.evaluate import Lpips
+
+    metric = Lpips(weights=None)
+    detail = "found" if metric.available else "none: the LPIPS column stays empty"
+    return Finding("LPIPS weights", metric.available, detail, metric.reason or "")
+
+
+def compiler() -> Finding:
+    found = shutil.which("g++")
+    return Finding(
+        "g++ (optional, torch.compile)", found is not None, found or "none", "apt-get install g++"
+    )
+
+
+CHECKS: tuple[Callable[[], Finding], ...] = (
+    python, libraries, renderer, llvm, optix, torch_device, lpips_weights, compiler,
+)  # fmt: skip
+
+
+def report(findings: Sequence[Finding]) -> str:
+    lines = []
+    for finding in findings:
+        mark = "ok     " if finding.present else ("MISSING" if finding.required else "absent ")
+        lines.append(f"{mark} {finding.name}: {finding.detail}")
+        if not finding.present and finding.remedy:
+            lines.append(f"          to get it: {finding.remedy}")
+    return "\n".join(lines)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point of `python -m ngi.doctor` and `ngi-doctor`."""
+    parser = argparse.ArgumentParser(prog="ngi.doctor", description=__doc__)
+    parser.parse_args(arguments)
+    findings = [check() for check in CHECKS]
+    print(report(findings))
+    return int(any(f.required and not f.present for f in findings))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

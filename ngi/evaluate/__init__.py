@@ -1,0 +1,33 @@
+"""How good a network is: protocol, test frames, references, metrics and pictures."""
+
+from ngi.evaluate.evaluation import Evaluation, FrameMetrics
+from ngi.evaluate.evaluator import Evaluator
+from ngi.evaluate.frames import Frame, evaluation_frames
+from ngi.evaluate.lpips_metric import Lpips
+from ngi.evaluate.metrics import dssim, mae, mape, non_finite_pixels, tone_map
+from ngi.evaluate.pictures import error_picture, write_pictures
+from ngi.evaluate.protocol import METRICS, SETS, EvaluationProtocol
+from ngi.evaluate.reference import Reference, relative_noise
+from ngi.evaluate.references import ReferenceCache
+
+__all__ = [
+    "METRICS",
+    "SETS",
+    "Evaluation",
+    "EvaluationProtocol",
+    "Evaluator",
+    "Frame",
+    "FrameMetrics",
+    "Lpips",
+    "Reference",
+    "ReferenceCache",
+    "dssim",
+    "error_picture",
+    "evaluation_frames",
+    "mae",
+    "mape",
+    "non_finite_pixels",
+    "relative_noise",
+    "tone_map",
+    "write_pictures",
+]

@@ -1,0 +1,143 @@
+"""Evaluates a prediction function on the test frames of one scene under one protocol."""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+from tqdm import tqdm
+
+from ngi.evaluate.evaluation import Evaluation, FrameMetrics
+from ngi.evaluate.frames import Frame, evaluation_frames
+from ngi.evaluate.lpips_metric import Lpips
+from ngi.evaluate.metrics import dssim, mae, mape, non_finite_pixels, tone_map
+from ngi.evaluate.protocol import EvaluationProtocol
+from ngi.evaluate.references import ReferenceCache
+from ngi.render.protocol import Renderer
+
+log = logging.getLogger(__name__)
+
+Predict = Callable[[Tensor, Tensor], Tensor]
+"""(buffers [H, W, C], v [D]) -> log1p of linear radiance [H, W, 3]; on any device."""
+
+
+@dataclass(frozen=True)
+class _PreparedFrame:
+    frame: Frame
+    buffers: Tensor
+    reference: Tensor
+    floor: FrameMetrics
+
+
+class Evaluator:
+    """Measures predictions of one scene's images.
+
+    The references are rendered, or read from the cache, by `prepare`, at the latest by the first
+    evaluation.
+    """
+
+    def __init__(
+        self,
+        *,
+        renderer: Renderer,
+        protocol: EvaluationProtocol,
+        cache: ReferenceCache,
+        lpips: Lpips,
+    ) -> None:
+        self.protocol = protocol
+        self._renderer = renderer
+        self._cache = cache
+        self._lpips = lpips
+        self._frames = evaluation_frames(renderer, protocol)
+        self._prepared: tuple[_PreparedFrame, ...] = ()
+        self._reference_hash = ""
+
+    def prepare(self) -> None:
+        """Renders the references that are not cached yet, with a progress bar."""
+        if self._prepared:
+            return
+        digest = hashlib.sha256()
+        prepared = []
+        with tqdm(self._frames, desc="references", unit="frame") as progress:
+            for frame in progress:
+                reference = self._cache.get(
+                    self._renderer,
+                    self.protocol,
+                    frame.scene_vector,
+                    on_pass=lambda samples, noise: progress.set_postfix_str(
+                        f"{samples} spp, noise {noise:.1%}"
+                    ),
+                )
+                if reference.noise > self.protocol.target_noise:
+                    log.info(
+                        "reference %s %d: noise %.1f %% after %d samples per pixel, wanted %.1f %%",
+                        frame.set,
+                        frame.index,
+                        100 * reference.noise,
+                        reference.samples_per_pixel,
+                        100 * self.protocol.target_noise,
+                    )
+                digest.update(f"{frame.set}/{frame.index}/{reference.content_hash}\n".encode())
+                prepared.append(
+                    _PreparedFrame(
+                        frame=frame,
+                        buffers=reference.buffers,
+                        reference=reference.radiance,
+                        floor=self._measure(frame, reference.half_a, reference.radiance),
+                    )
+                )
+        self._reference_hash = digest.hexdigest()[:16]
+        self._prepared = tuple(prepared)
+
+    def evaluate(self, predict: Predict) -> Evaluation:
+        """Predicts and measures every test frame.
+
+        predict: called once per frame, without gradients, with float32 tensors on the CPU.
+        Raises ValueError where its answer is not [H, W, 3].
+        """
+        self.prepare()
+        predictions = tuple(_radiance(predict, prepared) for prepared in self._prepared)
+        return Evaluation(
+            protocol=self.protocol,
+            frames=self._frames,
+            metrics=tuple(
+                self._measure(prepared.frame, prediction, prepared.reference)
+                for prepared, prediction in zip(self._prepared, predictions, strict=True)
+            ),
+            floors=tuple(prepared.floor for prepared in self._prepared),
+            predictions=predictions,
+            references=tuple(prepared.reference for prepared in self._prepared),
+            reference_hash=self._reference_hash,
+            lpips_note=self._lpips.reason,
+        )
+
+    def _measure(self, frame: Frame, prediction: Tensor, reference: Tensor) -> FrameMetrics:
+        """prediction, reference: [H, W, 3] linear radiance."""
+        protocol = self.protocol
+        picture = tone_map(prediction, protocol.exposure)
+        wanted = tone_map(reference, protocol.exposure)
+        return FrameMetrics(
+            set=frame.set,
+            index=frame.index,
+            mape=mape(prediction, reference, protocol.epsilon),
+            dssim=dssim(picture, wanted, window=protocol.ssim_window, sigma=protocol.ssim_sigma),
+            mae=mae(prediction, reference),
+            lpips=self._lpips(picture, wanted) if self._lpips.available else None,
+            non_finite=non_finite_pixels(prediction),
+        )
+
+
+def _radiance(predict: Predict, prepared: _PreparedFrame) -> Tensor:
+    """[H, W, 3] float32 linear radiance on the CPU; negative values stay as they are."""
+    with torch.no_grad():
+        log_radiance = predict(prepared.buffers, prepared.frame.scene_vector)
+    if log_radiance.shape != prepared.reference.shape:
+        raise ValueError(
+            f"prediction of shape {list(log_radiance.shape)}, "
+            f"expected {list(prepared.reference.shape)}"
+        )
+    return torch.expm1(log_radiance.detach().cpu().float())

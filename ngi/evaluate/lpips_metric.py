@@ -1,0 +1,114 @@
+"""LPIPS (Zhang et al. 2018) by the `lpips` package with AlexNet, never with random weights."""
+
+from __future__ import annotations
+
+import pickle
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+
+from ngi.torchvision_operators import ensure_torchvision_operators
+
+
+class Lpips:
+    """Learned perceptual distance of two images; 0 for equal ones.
+
+    weights: file with torchvision's AlexNet state dict, whole or its `features` alone; None takes
+        `alexnet-owt-7be5be79.pth` from PyTorch's hub cache. Nothing is ever downloaded.
+    Raises ValueError for a configured file that is missing or holds something else.
+    """
+
+    def __init__(self, *, weights: Path | str | None) -> None:
+        path = _cached_weights() if weights is None else Path(weights)
+        self.reason: str | None = None
+        """Why there is no LPIPS, in one sentence that says how to get it; None where there is."""
+        self._network: nn.Module | None = None
+        if weights is None and not path.exists():
+            self.reason = _how_to_get_weights(path)
+        else:
+            self._network = _network(_convolutions(path))
+
+    @property
+    def available(self) -> bool:
+        return self._network is not None
+
+    def __call__(self, prediction: Tensor, reference: Tensor) -> float:
+        """prediction, reference: [H, W, 3] sRGB in [0, 1], at least 31 x 31 pixels.
+
+        Raises RuntimeError with the reason where LPIPS is not available.
+        """
+        if self._network is None:
+            raise RuntimeError(self.reason)
+        device = next(self._network.parameters()).device
+        x, y = (
+            image.to(device, torch.float32).permute(2, 0, 1).unsqueeze(0) * 2 - 1
+            for image in (prediction, reference)
+        )
+        with torch.no_grad():
+            return self._network(x, y).item()
+
+
+def _cached_weights() -> Path:
+    return Path(torch.hub.get_dir()) / "checkpoints" / "alexnet-owt-7be5be79.pth"
+
+
+def _how_to_get_weights(path: Path) -> str:
+    ensure_torchvision_operators()
+    from torchvision.models import AlexNet_Weights
+
+    url = AlexNet_Weights.IMAGENET1K_V1.url
+    return (
+        f"no AlexNet weights for LPIPS: save {url} as {path}, "
+        "or name a copy with evaluation.evaluator.lpips.weights=FILE"
+    )
+
+
+def _convolutions(path: Path) -> dict[str, Tensor]:
+    """AlexNet's convolution weights and biases, by their names in torchvision ('0.weight', …)."""
+    try:
+        state: Any = torch.load(path, map_location="cpu", weights_only=True)
+    except FileNotFoundError as error:
+        raise ValueError(f"LPIPS weights {path}: there is no such file") from error
+    except (OSError, RuntimeError, EOFError, pickle.UnpicklingError) as error:
+        raise ValueError(f"LPIPS weights {path} cannot be read: {error}") from error
+    found = {}
+    if isinstance(state, Mapping):
+        found = {
+            str(name).removeprefix("features."): value
+            for name, value in state.items()
+            if str(name).startswith("features.") or str(name)[:1].isdigit()
+        }
+    if not found:
+        raise ValueError(
+            f"LPIPS weights {path}: expected torchvision's AlexNet state dict or its features"
+        )
+    return found
+
+
+def _network(convolutions: dict[str, Tensor]) -> nn.Module:
+    """The package's network with its own linear layers and the given AlexNet features."""
+    ensure_torchvision_operators()
+    # The package builds a random AlexNet first, and by a way torchvision calls deprecated.
+    with torch.random.fork_rng(devices=[]), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        import lpips
+
+        network: nn.Module = lpips.LPIPS(net="alex", pnet_rand=True, verbose=False)
+    # The package cuts AlexNet into slices and keeps the layers' numbers: slice2.3 is features.3.
+    features = network.get_submodule("net")
+    wanted = {name.split(".", 1)[1]: value for name, value in features.state_dict().items()}
+    different = [
+        name
+        for name, value in wanted.items()
+        if name not in convolutions or convolutions[name].shape != value.shape
+    ]
+    if different:
+        raise ValueError(f"LPIPS weights: AlexNet's features lack {', '.join(different)}")
+    features.load_state_dict(
+        {name: convolutions[name.split(".", 1)[1]] for name in features.state_dict()}
+    )
+    return network.requires_grad_(False).eval()

@@ -1,0 +1,89 @@
+"""Error metrics of one image against its reference (paper, Sec. 7.2.1).
+
+MAPE and MAE compare linear radiance, DSSIM and LPIPS tone-mapped sRGB. Values that are NaN or Inf
+are never hidden: they make each of the four metrics NaN or Inf.
+"""
+
+from __future__ import annotations
+
+import torch
+import torch.nn.functional as F
+from torch import Tensor
+
+
+def mape(prediction: Tensor, reference: Tensor, epsilon: float) -> float:
+    """Mean of |prediction - reference| / (reference + epsilon), the release's definition.
+
+    prediction, reference: [H, W, 3] linear radiance; epsilon in the same unit.
+    """
+    _check_shapes(prediction, reference)
+    return (_difference(prediction, reference) / (reference.double() + epsilon)).mean().item()
+
+
+def mae(prediction: Tensor, reference: Tensor) -> float:
+    """Mean absolute error of [H, W, 3] linear radiance."""
+    _check_shapes(prediction, reference)
+    return _difference(prediction, reference).mean().item()
+
+
+def dssim(prediction: Tensor, reference: Tensor, *, window: int = 11, sigma: float = 1.5) -> float:
+    """Structural dissimilarity (1 - SSIM) / 2 of two [H, W, 3] images with values in [0, 1].
+
+    SSIM = (2 μx μy + C1)(2 σxy + C2) / ((μx² + μy² + C1)(σx² + σy² + C2)) of Wang et al. 2004 with
+    C1 = 0.01², C2 = 0.03²; the moments are taken under a Gaussian of `sigma` pixels cut to
+    `window` x `window` and normalised, without Bessel's correction; the mean goes over the
+    channels and over the pixels whose window lies inside the image. Equal to scikit-image's
+    structural_similarity(gaussian_weights=True, use_sample_covariance=False) for (11, 1.5).
+    """
+    _check_shapes(prediction, reference)
+    if window % 2 == 0 or min(prediction.shape[:2]) < window:
+        raise ValueError(
+            f"SSIM window of {window} pixels: it has to be odd and no larger than the image of "
+            f"{prediction.shape[1]} x {prediction.shape[0]} pixels"
+        )
+    offset = torch.arange(window, dtype=torch.float64, device=prediction.device) - window // 2
+    kernel = torch.exp(-0.5 * (offset / sigma) ** 2)
+    kernel = kernel / kernel.sum()
+
+    def local_mean(image: Tensor) -> Tensor:
+        rows = F.conv2d(image, kernel.view(1, 1, -1, 1))
+        return F.conv2d(rows, kernel.view(1, 1, 1, -1))
+
+    # Double precision: the variances below are differences of nearly equal numbers.
+    x = prediction.double().permute(2, 0, 1).unsqueeze(1)
+    y = reference.double().permute(2, 0, 1).unsqueeze(1)
+    μx, μy = local_mean(x), local_mean(y)
+    σxx, σyy = local_mean(x * x) - μx * μx, local_mean(y * y) - μy * μy
+    σxy = local_mean(x * y) - μx * μy
+    C1, C2 = 0.01**2, 0.03**2
+    ssim = (2 * μx * μy + C1) * (2 * σxy + C2) / ((μx**2 + μy**2 + C1) * (σxx + σyy + C2))
+    return 0.5 * (1 - ssim.mean().item())
+
+
+def tone_map(radiance: Tensor, exposure: float = 0.0) -> Tensor:
+    """Linear radiance to sRGB in [0, 1]: times 2^exposure, clipped, sRGB transfer curve.
+
+    radiance: [..., 3] linear RGB with sRGB primaries; exposure in stops. Inf becomes NaN instead
+    of white, so that what is computed from the picture does not hide it.
+    """
+    visible = torch.where(radiance.isfinite(), radiance * 2.0**exposure, torch.nan)
+    linear = visible.clamp(0, 1)
+    curve = 1.055 * linear.clamp(min=0.0031308) ** (1 / 2.4) - 0.055
+    return torch.where(linear <= 0.0031308, 12.92 * linear, curve)
+
+
+def non_finite_pixels(image: Tensor) -> int:
+    """Number of pixels of an [H, W, 3] image with a NaN or Inf in any channel."""
+    return int((~image.isfinite()).any(dim=-1).sum())
+
+
+def _difference(prediction: Tensor, reference: Tensor) -> Tensor:
+    return (prediction.double() - reference.double()).abs()
+
+
+def _check_shapes(prediction: Tensor, reference: Tensor) -> None:
+    if prediction.shape != reference.shape or prediction.ndim != 3 or prediction.shape[2] != 3:
+        raise ValueError(
+            f"prediction {list(prediction.shape)} and reference {list(reference.shape)}: "
+            "both have to be [H, W, 3] of the same size"
+        )

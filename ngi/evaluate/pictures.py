@@ -1,0 +1,118 @@
+"""Pictures of predictions: prediction | reference | error map, as PNG."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import torch
+from PIL import Image, ImageDraw, ImageFont
+from PIL.PngImagePlugin import PngInfo
+from torch import Tensor
+
+from ngi.evaluate.metrics import tone_map
+
+ERROR_RANGE = 1.0
+"""Relative error shown as the brightest colour, the same in every picture."""
+
+COLOUR_MAP = "inferno"
+NON_FINITE = (0, 255, 255)
+"""Colour of pixels that are NaN or Inf: it occurs neither in the colour map nor in most scenes."""
+
+PANEL = 256
+"""Pixels a triptych's panels are enlarged to, by a whole factor, where they are smaller."""
+
+_MARGIN = 12
+_BAR_WIDTH = 14
+
+
+def write_pictures(
+    folder: Path,
+    name: str,
+    *,
+    prediction: Tensor,
+    reference: Tensor,
+    epsilon: float,
+    exposure: float,
+    mape: float,
+) -> None:
+    """Writes `{name}_prediction.png`, `_reference.png`, `_error.png` and the triptych `{name}.png`.
+
+    prediction, reference: [H, W, 3] linear radiance; mape: for the triptych's label. The error
+    map's PNG carries as text what it shows ("scale"), its "colour_map", and the "maximum" where
+    that ends.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    pictures = {
+        "prediction": _srgb_picture(prediction, exposure),
+        "reference": _srgb_picture(reference, exposure),
+        "error": Image.fromarray(error_picture(prediction, reference, epsilon)),
+    }
+    scale = PngInfo()
+    scale.add_text("scale", f"|prediction - reference| / (reference + {epsilon:g}), mean of RGB")
+    scale.add_text("colour_map", COLOUR_MAP)
+    scale.add_text("maximum", f"{ERROR_RANGE:g}")
+    for kind, picture in pictures.items():
+        picture.save(folder / f"{name}_{kind}.png", pnginfo=scale if kind == "error" else None)
+    labels = ("prediction", "reference", f"relative error (MAPE {mape:.3f})")
+    _triptych(list(pictures.values()), labels).save(folder / f"{name}.png")
+
+
+def error_picture(prediction: Tensor, reference: Tensor, epsilon: float) -> np.ndarray:
+    """[H, W, 3] uint8: colour-mapped |prediction - reference| / (reference + epsilon).
+
+    Mean over the channels, linear from 0 to `ERROR_RANGE`, clipped; non-finite pixels in cyan.
+    """
+    error = ((prediction - reference).abs() / (reference + epsilon)).mean(dim=-1).cpu().numpy()
+    coloured = matplotlib.colormaps[COLOUR_MAP](np.nan_to_num(error) / ERROR_RANGE, bytes=True)
+    coloured = coloured[..., :3].copy()
+    coloured[~np.isfinite(error)] = NON_FINITE
+    return coloured
+
+
+def _srgb_picture(radiance: Tensor, exposure: float) -> Image.Image:
+    picture = tone_map(radiance, exposure).cpu()
+    eight_bit = (picture.nan_to_num() * 255).round().to(torch.uint8).numpy()
+    eight_bit[picture.isnan().any(dim=-1).numpy()] = NON_FINITE
+    return Image.fromarray(eight_bit)
+
+
+def _triptych(pictures: list[Image.Image], labels: tuple[str, ...]) -> Image.Image:
+    """The pictures side by side under their labels, then the error map's colour bar."""
+    factor = max(1, PANEL // pictures[0].height)
+    size = (pictures[0].width * factor, pictures[0].height * factor)
+    font = ImageFont.truetype(_font_file(), 15)
+    top = 2 * _MARGIN + 14
+    right = _MARGIN + _BAR_WIDTH + 48
+    sheet = Image.new(
+        "RGB", ((size[0] + _MARGIN) * len(pictures) + right, size[1] + top + _MARGIN), "white"
+    )
+    draw = ImageDraw.Draw(sheet)
+    for column, (picture, label) in enumerate(zip(pictures, labels, strict=True)):
+        left = _MARGIN + column * (size[0] + _MARGIN)
+        draw.text((left, _MARGIN), label, fill="black", font=font)
+        sheet.paste(picture.resize(size, Image.Resampling.NEAREST), (left, top))
+    _draw_colour_bar(sheet, left=_MARGIN + len(pictures) * (size[0] + _MARGIN), top=top)
+    return sheet
+
+
+def _draw_colour_bar(sheet: Image.Image, *, left: int, top: int) -> None:
+    height = sheet.height - top - _MARGIN
+    levels = np.repeat(np.linspace(1, 0, height)[:, None], _BAR_WIDTH, axis=1)
+    colours = matplotlib.colormaps[COLOUR_MAP](levels, bytes=True)[..., :3]
+    sheet.paste(Image.fromarray(np.ascontiguousarray(colours)), (left, top))
+    draw = ImageDraw.Draw(sheet)
+    font = ImageFont.truetype(_font_file(), 12)
+    for value in (0.0, 0.5, 1.0):
+        y = top + (1 - value) * (height - 1)
+        label = f"{value * ERROR_RANGE:g}"
+        if value == 1.0:
+            label = f"≥ {label}"
+        draw.line((left + _BAR_WIDTH, y, left + _BAR_WIDTH + 4, y), fill="black")
+        draw.text((left + _BAR_WIDTH + 8, y), label, fill="black", font=font, anchor="lm")
+
+
+def _font_file() -> str:
+    """A font with every sign the labels need, which matplotlib always brings."""
+    return str(Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf")

@@ -1,0 +1,89 @@
+"""What is measured, as a named object: results of two protocols are never compared."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass
+
+SETS = ("hard", "uniform")
+"""The two sets of test frames: the scene's hard frames, and v spread evenly over [0, 1]^D."""
+
+METRICS = ("mape", "dssim", "mae", "lpips")
+"""The paper's four metrics (Sec. 7.2.1), in the order of every table."""
+
+DEFINITIONS = 1
+"""Counts changes of the metrics' formulas; part of a protocol's identity."""
+
+SMALLEST_RESOLUTION = 32
+"""Pixels; of smaller images LPIPS's AlexNet pools everything away."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class EvaluationProtocol:
+    """Every number that decides what a metric's value means.
+
+    name: what tables call it; a changed number wants a changed name
+    resolution: width and height in pixels of every test frame
+    low_discrepancy_frames: number of frames of the set "uniform"
+    target_noise: mean relative standard error at which a reference is good enough
+    samples_per_pass: samples per pixel by which each half of a reference grows
+    maximum_samples: samples per pixel of both halves together at which a reference stops anyway
+    epsilon: of the relative errors |d| / (reference + epsilon), linear radiance
+    exposure: stops; tone mapping multiplies radiance by 2^exposure
+    ssim_window, ssim_sigma: side in pixels (odd) and standard deviation of SSIM's Gaussian window
+    sobol_seed: of the scrambling of the low-discrepancy set
+
+    Raises ValueError for values that cannot be measured with.
+    """
+
+    name: str
+    resolution: int
+    low_discrepancy_frames: int
+    target_noise: float
+    samples_per_pass: int
+    maximum_samples: int
+    epsilon: float = 0.01
+    exposure: float = 0.0
+    ssim_window: int = 11
+    ssim_sigma: float = 1.5
+    sobol_seed: int = 0
+
+    def __post_init__(self) -> None:
+        for key, lowest in (
+            ("resolution", max(SMALLEST_RESOLUTION, self.ssim_window)),
+            ("low_discrepancy_frames", 1),
+            ("samples_per_pass", 1),
+            ("maximum_samples", 2 * self.samples_per_pass),
+            ("ssim_window", 1),
+        ):
+            if getattr(self, key) < lowest:
+                raise ValueError(self._message(key, f"at least {lowest}"))
+        for key in ("target_noise", "epsilon", "ssim_sigma"):
+            if not getattr(self, key) > 0:
+                raise ValueError(self._message(key, "more than 0"))
+        if self.ssim_window % 2 == 0:
+            raise ValueError(self._message("ssim_window", "odd"))
+
+    def _message(self, key: str, expected: str) -> str:
+        return (
+            f"evaluation protocol '{self.name}': {key} is {getattr(self, key)}, "
+            f"it has to be {expected}"
+        )
+
+    @property
+    def identity(self) -> str:
+        """16 hexadecimal digits of a hash over every field and the metrics' definitions."""
+        content = json.dumps({**asdict(self), "definitions": DEFINITIONS}, sort_keys=True)
+        return hashlib.sha256(content.encode()).hexdigest()[:16]
+
+    @property
+    def reference_settings(self) -> dict[str, float]:
+        """The fields that decide a reference image; protocols that share them share references."""
+        return {
+            "resolution": self.resolution,
+            "epsilon": self.epsilon,
+            "target_noise": self.target_noise,
+            "samples_per_pass": self.samples_per_pass,
+            "maximum_samples": self.maximum_samples,
+        }

@@ -1,0 +1,109 @@
+"""A reference image: two independent halves, their noise, and the file they are kept in."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import os
+import zipfile
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+
+UNREADABLE = (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile, zlib.error)
+"""What reading a damaged reference file may raise."""
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A reference image in two independent halves.
+
+    key: content hash, also the cache file's name
+    buffers: [H, W, C] float32, at the samples per pixel of one pass
+    half_a, half_b: [H, W, 3] float32, linear RGB radiance, each from half of the samples
+    samples_per_pixel: of both halves together
+    noise: mean relative standard error of `radiance`, see `relative_noise`
+    backend: what rendered it, for the record
+    """
+
+    key: str
+    buffers: Tensor
+    half_a: Tensor
+    half_b: Tensor
+    samples_per_pixel: int
+    noise: float
+    backend: str
+
+    @property
+    def radiance(self) -> Tensor:
+        """[H, W, 3] linear RGB, the mean of the halves.
+
+        Its error has the distribution of (half_a - half_b) / 2 = half_a - radiance, so
+        metric(half_a, radiance) is what a perfect prediction would score: the metric's floor.
+        """
+        return 0.5 * (self.half_a + self.half_b)
+
+    @property
+    def content_hash(self) -> str:
+        """Hash of what predictions see and are compared with: buffers and radiance."""
+        digest = hashlib.sha256()
+        for tensor in (self.buffers, self.half_a, self.half_b):
+            digest.update(tensor.contiguous().numpy().tobytes())
+        return digest.hexdigest()
+
+
+def relative_noise(half_a: Tensor, half_b: Tensor, epsilon: float) -> float:
+    """Mean over pixels of standard error / (radiance + epsilon) of the mean of two halves.
+
+    half_a, half_b: [H, W, 3] linear radiance, independent and of the same variance. A pixel's
+    standard error is estimated as sqrt(π / 2) |a - b| / 2, unbiased for normal noise.
+    """
+    radiance = 0.5 * (half_a + half_b)
+    deviation = 0.5 * (half_a - half_b).abs()
+    return math.sqrt(math.pi / 2) * (deviation / (radiance + epsilon)).double().mean().item()
+
+
+def write_reference(path: Path, reference: Reference) -> None:
+    """Writes one .npz file atomically: a crash or a full disk leaves the old file or none."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_suffix(f".{os.getpid()}.partial")
+    try:
+        with partial.open("wb") as stream:
+            np.savez_compressed(
+                stream,
+                key=np.array(reference.key),
+                buffers=reference.buffers.numpy(),
+                half_a=reference.half_a.numpy(),
+                half_b=reference.half_b.numpy(),
+                samples_per_pixel=np.array(reference.samples_per_pixel),
+                noise=np.array(reference.noise),
+                backend=np.array(reference.backend),
+            )
+            stream.flush()
+            os.fsync(stream.fileno())
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def read_reference(path: Path, *, resolution: int) -> Reference:
+    """Reads what `write_reference` wrote; raises one of `UNREADABLE` for a damaged file."""
+    # numpy would leave a damaged file open.
+    with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
+        reference = Reference(
+            key=str(file["key"]),
+            buffers=torch.from_numpy(file["buffers"]),
+            half_a=torch.from_numpy(file["half_a"]),
+            half_b=torch.from_numpy(file["half_b"]),
+            samples_per_pixel=int(file["samples_per_pixel"]),
+            noise=float(file["noise"]),
+            backend=str(file["backend"]),
+        )
+    expected = (resolution, resolution, 3)
+    if reference.key != path.stem or reference.half_a.shape != expected:
+        raise ValueError("its content is not what its name says")
+    return reference

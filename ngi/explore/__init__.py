@@ -1,0 +1,41 @@
+"""Active exploration of the data space: chains, proposals, targets, acceptance, resolution.
+
+Tensors only: neither renderer nor network is known here.
+"""
+
+from ngi.explore.acceptance import Acceptance, Always, Greedy, Metropolis
+from ngi.explore.chains import ChainInfo, ChainState, MarkovChains
+from ngi.explore.proposals import (
+    ExponentialPerturbation,
+    NormalPerturbation,
+    ProposalDistribution,
+    Proposals,
+)
+from ngi.explore.resolution import Constant as ConstantResolution
+from ngi.explore.resolution import Growing as GrowingResolution
+from ngi.explore.resolution import ResolutionSchedule
+from ngi.explore.targets import Constant as ConstantTarget
+from ngi.explore.targets import Loss, LossTimesOutputGradient, LossTimesStep, Signals, Target
+
+__all__ = [
+    "Acceptance",
+    "Always",
+    "ChainInfo",
+    "ChainState",
+    "ConstantResolution",
+    "ConstantTarget",
+    "ExponentialPerturbation",
+    "Greedy",
+    "GrowingResolution",
+    "Loss",
+    "LossTimesOutputGradient",
+    "LossTimesStep",
+    "MarkovChains",
+    "Metropolis",
+    "NormalPerturbation",
+    "ProposalDistribution",
+    "Proposals",
+    "ResolutionSchedule",
+    "Signals",
+    "Target",
+]

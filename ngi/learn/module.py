@@ -1,0 +1,90 @@
+"""The LightningModule: network, loss and optimiser, and what each step tells the sampler."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any, TypeVar
+
+import torch
+from torch import Tensor, nn
+
+from ngi.explore import Target
+from ngi.learn.clock import PhaseClock
+from ngi.learn.lightning_api import LightningModule
+from ngi.learn.scorer import Scorer
+from ngi.learn.stream import Batch, Feedback
+from ngi.models import SampleLoss
+
+T = TypeVar("T")
+
+OptimizerFactory = Callable[[Iterable[nn.Parameter]], torch.optim.Optimizer]
+
+
+class IlluminationModule(LightningModule):
+    """Fits `network` to log1p radiance by the mean of `loss` over a batch.
+
+    network: (buffers [n, H, W, C], scene_vector [n, D]) -> log1p radiance [n, H, W, 3]
+    loss: (prediction, target) -> loss per sample [n]
+    optimizer: makes the optimiser from the parameters
+    target: the target density that the chains explore
+    """
+
+    def __init__(
+        self,
+        *,
+        network: nn.Module,
+        loss: SampleLoss,
+        optimizer: OptimizerFactory,
+        target: Target,
+        clock: PhaseClock,
+    ) -> None:
+        super().__init__()
+        self.network = network
+        self.loss = loss
+        self._make_optimizer = optimizer
+        self._scorer = Scorer(target=target, network=network, loss=loss)
+        self._clock = clock
+
+    def configure_optimizers(self) -> torch.optim.Optimizer:
+        return self._make_optimizer(self.network.parameters())
+
+    def training_step(self, batch: Batch, batch_idx: int) -> dict[str, Any]:  # noqa: ARG002
+        prediction = self.network(batch.patches.buffers, batch.patches.scene_vector)
+        losses = self.loss(prediction, batch.patches.log_radiance)
+        loss = losses.mean()
+        if not torch.isfinite(loss):
+            raise FloatingPointError(
+                f"the loss is {loss.item()} at step {self.global_step} (per sample: "
+                f"{losses.tolist()}); the run stops before the weights are harmed. Start it again "
+                "to go on from its last checkpoint, or lower optimizer.lr"
+            )
+        return {"loss": loss, "feedback": self._feedback(batch, prediction, losses)}
+
+    def _feedback(self, batch: Batch, prediction: Tensor, losses: Tensor) -> Feedback:
+        if batch.current is None:
+            return Feedback(losses.detach(), None, None)
+        optimizer = self.optimizers(use_pl_optimizer=False)
+        assert isinstance(optimizer, torch.optim.Optimizer)
+        with self._clock.phase("score"):
+            proposed, current = self._scorer(batch, prediction, losses, optimizer)
+        return Feedback(losses.detach(), proposed, current)
+
+    def predict(self, buffers: Tensor, scene_vector: Tensor) -> Tensor:
+        """One image: buffers [H, W, C] and v [D] to log1p radiance [H, W, 3] on the CPU."""
+        with torch.no_grad(), self.trainer.precision_plugin.forward_context():
+            output = self.network.render(buffers.to(self.device), scene_vector.to(self.device))  # type: ignore[operator]
+        return output.float().cpu()
+
+
+def seeded(make: Callable[..., T], *, seed: int) -> Callable[..., T]:
+    """`make`, with PyTorch's global generator seeded inside it and left as it was outside.
+
+    PyTorch's initialisers know no other generator.
+    """
+
+    def seeded_make(**arguments: Any) -> T:
+        with torch.random.fork_rng():
+            torch.manual_seed(seed)
+            return make(**arguments)
+
+    return seeded_make

@@ -1,0 +1,95 @@
+"""Evaluates a run and keeps what was found: metrics.csv, pictures, result.json."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from typing import Any
+
+from torch import Tensor
+
+from ngi.evaluate import Evaluation, Evaluator
+from ngi.learn.clock import PhaseClock
+from ngi.learn.result import provenance
+from ngi.learn.run_folder import RunFolder
+from ngi.learn.stream import TrainingStream
+from ngi.learn.tracker import Tracker
+
+log = logging.getLogger(__name__)
+
+Predict = Callable[[Tensor, Tensor], Tensor]
+"""(buffers [H, W, C], v [D]) -> log1p radiance [H, W, 3]"""
+
+
+class Recorder:
+    """Writes a row of metrics.csv per evaluation, and at the end the pictures and the result."""
+
+    def __init__(
+        self,
+        *,
+        evaluator: Evaluator,
+        predict: Predict,
+        folder: RunFolder,
+        stream: TrainingStream,
+        clock: PhaseClock,
+        tracker: Tracker,
+        label: dict[str, Any],
+        backend: str,
+    ) -> None:
+        self._evaluator = evaluator
+        self._predict = predict
+        self._folder = folder
+        self._stream = stream
+        self._clock = clock
+        self._tracker = tracker
+        self._label = label
+        self._backend = backend
+
+    def prepare(self) -> None:
+        """Renders the reference images that are not cached yet."""
+        self._evaluator.prepare()
+
+    def evaluate(self) -> Evaluation:
+        """Evaluates the network as it is, and appends a row to metrics.csv."""
+        evaluation = self._evaluator.evaluate(self._predict)
+        row = {
+            "step": self._stream.counters.iteration,
+            "run_seconds": self._clock.run_seconds,
+            **{f"{name}_seconds": value for name, value in self._clock.seconds.items()},
+            "patches_traced": self._stream.counters.patches_traced,
+            "paths_traced": self._stream.counters.paths_traced,
+            **evaluation.row(),
+        }
+        self._folder.metrics.append(row)
+        self._folder.metrics.flush()
+        self._tracker.log(row)
+        return evaluation
+
+    def finish(self) -> dict[str, Any]:
+        """The last evaluation, with pictures; writes and returns the result."""
+        # Killed between the last row and the result, a resumed run would write that row twice.
+        self._folder.metrics.keep_until(self._stream.counters.iteration - 1)
+        evaluation = self.evaluate()
+        evaluation.write_pictures(self._folder.pictures)
+        counters = self._stream.counters
+        result = {
+            **provenance(backend=self._backend),
+            "identity": self._folder.identity,
+            "finished": True,
+            "label": self._label,
+            "seed": self._label["seed"],
+            "config": self._folder.settings,
+            "seconds": dict(self._clock.seconds),
+            "run_seconds": self._clock.run_seconds,
+            "steps": counters.iteration,
+            "generated_batches": counters.generated_batches,
+            "patches_traced": counters.patches_traced,
+            "paths_traced": counters.paths_traced,
+            "patches_repaired": counters.patches_repaired,
+            "patches_masked": counters.patches_masked,
+            "non_finite_losses": self._stream.store.non_finite_losses,
+            "scene_hash": self._folder.settings["scene"]["hash"],
+            **evaluation.result(),
+        }
+        self._folder.write_result(result)
+        return result

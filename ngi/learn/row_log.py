@@ -1,0 +1,66 @@
+"""A CSV file that grows row by row and can be cut back to an earlier step."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TextIO
+
+
+class RowLog:
+    """Rows with a `step` column, appended to a CSV file.
+
+    The columns are those of the file, or else of the first row; values missing later stay empty.
+    Raises ValueError for a row with a column the file does not have.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._stream: TextIO | None = None
+        self._writer: csv.DictWriter[str] | None = None
+
+    def append(self, row: Mapping[str, object]) -> None:
+        if self._writer is None:
+            self._open(list(row))
+        assert self._writer is not None
+        self._writer.writerow(row)
+
+    def flush(self) -> None:
+        if self._stream is not None:
+            self._stream.flush()
+
+    def keep_until(self, step: int) -> None:
+        """Drops rows after `step`: what a run did after its last checkpoint is done again."""
+        self.close()
+        if not self.path.exists():
+            return
+        with self.path.open(newline="") as stream:
+            lines = stream.readlines()
+        if not lines:
+            return
+        position = next(csv.reader(lines[:1])).index("step")
+        kept = lines[:1]
+        for line in lines[1:]:
+            fields = next(csv.reader([line]), [])
+            # A last line cut short by a crash has no newline, and its numbers can't be trusted.
+            if line.endswith("\n") and len(fields) > position and int(fields[position]) <= step:
+                kept.append(line)
+        temporary = self.path.with_name(self.path.name + ".tmp")
+        temporary.write_text("".join(kept))
+        temporary.replace(self.path)
+
+    def close(self) -> None:
+        if self._stream is not None:
+            self._stream.close()
+        self._stream = self._writer = None
+
+    def _open(self, columns: list[str]) -> None:
+        continued = self.path.exists() and self.path.stat().st_size > 0
+        if continued:
+            with self.path.open(newline="") as stream:
+                columns = next(csv.reader(stream))
+        self._stream = self.path.open("a", newline="")
+        self._writer = csv.DictWriter(self._stream, columns, restval="", lineterminator="\n")
+        if not continued:
+            self._writer.writeheader()

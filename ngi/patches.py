@@ -1,0 +1,104 @@
+"""The data that flows from the renderer through exploration and reuse to the network.
+
+Everything here is plain PyTorch; neither Mitsuba nor the network is known.
+
+The state of a chain is a point of the unit hypercube of D + 2 dimensions: the D scene
+variables v, then the two coordinates of the patch position (paper, Sec. 4 and 5.1).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from typing import Self
+
+import torch
+from torch import Tensor
+
+BUFFER_CHANNELS = {
+    "position": 3,
+    "normal": 3,
+    "outgoing": 3,
+    "albedo": 3,
+    "roughness": 1,
+    "emission": 3,
+}
+"""Every first-intersection buffer of the paper (Sec. 4.2) and its channels, in storage order."""
+
+
+@dataclass(frozen=True)
+class BufferLayout:
+    """Which first-intersection buffers a scene carries, in the order of `BUFFER_CHANNELS`.
+
+    A scene in which a buffer can only be constant does not carry it. `position` is always there.
+
+    - position: world position, normalised to [0, 1]^3 by the scene's fixed box
+    - normal: shading normal n mapped by n / 2 + 1 / 2
+    - outgoing: direction from the surface towards the camera, world space, in [-1, 1]
+    - albedo: diffuse or specular reflectance, linear RGB in [0, 1]
+    - roughness: GGX/Beckmann alpha; 0 for a perfectly smooth BSDF, 1 for a diffuse one
+    - emission: log1p of the emitted radiance, linear RGB
+    """
+
+    names: tuple[str, ...] = tuple(BUFFER_CHANNELS)
+
+    def __post_init__(self) -> None:
+        expected = tuple(name for name in BUFFER_CHANNELS if name in self.names)
+        if self.names != expected or "position" not in self.names:
+            raise ValueError(
+                f"buffers {list(self.names)}: expected 'position' and a selection of "
+                f"{list(BUFFER_CHANNELS)} in that order"
+            )
+
+    @property
+    def channels(self) -> int:
+        """Number of channels of all buffers, emission included."""
+        return sum(BUFFER_CHANNELS[name] for name in self.names)
+
+    @property
+    def input_channels(self) -> int:
+        """Number of channels the network sees: all but emission, which is passed through."""
+        return self.channels - (BUFFER_CHANNELS["emission"] if "emission" in self.names else 0)
+
+    def slice(self, name: str) -> slice:
+        """The channels of one buffer; raises KeyError where the scene does not carry it."""
+        if name not in self.names:
+            raise KeyError(f"this scene carries no buffer '{name}', only {list(self.names)}")
+        start = 0
+        for other in self.names:
+            if other == name:
+                break
+            start += BUFFER_CHANNELS[other]
+        return slice(start, start + BUFFER_CHANNELS[name])
+
+
+@dataclass(frozen=True)
+class Patches:
+    """n rendered patches of P x P pixels.
+
+    scene_vector: [n, D] float32, v in [0, 1]^D, stored once per patch
+    position: [n, 2] float32, patch position (x, y) in [0, 1]^2
+    resolution: [n] int64, width and height in pixels of the virtual image the patch is cut from
+    large_step: [n] bool, whether the chain came here by a large step
+    buffers: [n, P, P, C] float32, channels as the scene's `BufferLayout` says
+    log_radiance: [n, P, P, 3] float32, log1p of linear RGB radiance, finite
+    """
+
+    scene_vector: Tensor
+    position: Tensor
+    resolution: Tensor
+    large_step: Tensor
+    buffers: Tensor
+    log_radiance: Tensor
+
+    def __len__(self) -> int:
+        return self.scene_vector.shape[0]
+
+    def __getitem__(self, index: Tensor | slice) -> Self:
+        return replace(self, **{f.name: getattr(self, f.name)[index] for f in fields(self)})
+
+    def to(self, device: torch.device | str) -> Self:
+        return replace(self, **{f.name: getattr(self, f.name).to(device) for f in fields(self)})
+
+    @classmethod
+    def concatenate(cls, parts: list[Self]) -> Self:
+        return cls(**{f.name: torch.cat([getattr(p, f.name) for p in parts]) for f in fields(cls)})

@@ -1,0 +1,10 @@
+"""(scene, v, patch) -> first-intersection buffers and radiance.
+
+`MitsubaRenderer` needs Mitsuba and is imported from `ngi.render.mitsuba_renderer`; everything
+here does not.
+"""
+
+from ngi.render.analytic import AnalyticRenderer
+from ngi.render.protocol import RenderedImage, RenderedPatches, Renderer
+
+__all__ = ["AnalyticRenderer", "RenderedImage", "RenderedPatches", "Renderer"]

@@ -1,0 +1,121 @@
+"""Tracing with Dr.Jit (LLVM or CUDA): one kernel for radiance, one for buffers, never compiled
+again after the first patch.
+
+The film's crop window is not used, since it would be compiled into the kernel; the rays of a
+window are asked of the sensor directly. Everything that differs from window to window is opaque.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ngi.backend import dr, mi
+from ngi.render.first_hit import FirstHit
+from ngi.render.tracing import Pending, Window, subpixel_points
+
+
+class JitTracer:
+    """The `ngi.render.tracing.Tracer` of the JIT variants; results are computed asynchronously.
+
+    frozen: replay recorded kernel launches instead of tracing the Python code again, which is
+        worth it for many windows of one size (patches), not for a few (images).
+    """
+
+    def __init__(
+        self, *, scene: mi.Scene, first_hit: FirstHit, buffer_samples: int, frozen: bool
+    ) -> None:
+        self._scene = scene
+        self._buffer_samples = buffer_samples
+        points = subpixel_points(buffer_samples)
+        self._points = mi.Point2f(points[:, 0], points[:, 1])
+        dr.eval(self._points)
+        # Plain functions, not methods: a frozen function follows the arrays of its arguments only,
+        # and holds what is constant for this tracer in its closure.
+        integrator = scene.integrator()
+        sampler = mi.load_dict({"type": "independent"})
+
+        def trace_radiance(
+            scene: mi.Scene, view: _View, seed: mi.UInt32, samples: int, paths: int
+        ) -> list[mi.Float]:
+            rng = sampler.fork()
+            rng.seed(seed, paths)
+            ray = view.rays(scene, dr.arange(mi.UInt32, paths) // view.samples, rng.next_2d())
+            radiance, _, _ = integrator.sample(scene, rng, mi.RayDifferential3f(ray))
+            return _block_sums(list(mi.Color3f(radiance)), samples)
+
+        def trace_buffers(
+            scene: mi.Scene, view: _View, points: mi.Point2f, samples: int, rays: int
+        ) -> list[mi.Float]:
+            index = dr.arange(mi.UInt32, rays)
+            pixel = index // view.samples
+            jitter = dr.gather(mi.Point2f, points, index - pixel * view.samples)
+            channels = first_hit.channels(scene, view.rays(scene, pixel, jitter))
+            return _block_sums(channels, samples)
+
+        self._radiance = dr.freeze(trace_radiance) if frozen else trace_radiance
+        self._buffers = dr.freeze(trace_buffers) if frozen else trace_buffers
+
+    def radiance(self, window: Window, *, samples: int, seed: int) -> Pending:
+        view = _View.of(window, samples)
+        paths = window.width * window.height * samples
+        sums = self._radiance(self._scene, view, dr.opaque(mi.UInt32, seed), samples, paths)
+        return _pending(sums, window, samples)
+
+    def buffers(self, window: Window) -> Pending:
+        samples = self._buffer_samples
+        view = _View.of(window, samples)
+        rays = window.width * window.height * samples
+        sums = self._buffers(self._scene, view, self._points, samples, rays)
+        return _pending(sums, window, samples)
+
+
+@dataclass(frozen=True)
+class _View:
+    """A window and its number of samples as opaque arrays of size 1, a PyTree for Dr.Jit."""
+
+    x: mi.UInt32
+    y: mi.UInt32
+    width: mi.UInt32
+    samples: mi.UInt32
+    resolution: mi.Float
+
+    @classmethod
+    def of(cls, window: Window, samples: int) -> _View:
+        return cls(
+            x=dr.opaque(mi.UInt32, window.x),
+            y=dr.opaque(mi.UInt32, window.y),
+            width=dr.opaque(mi.UInt32, window.width),
+            samples=dr.opaque(mi.UInt32, samples),
+            resolution=dr.opaque(mi.Float, window.resolution),
+        )
+
+    def rays(self, scene: mi.Scene, pixel: mi.UInt32, jitter: mi.Point2f) -> mi.Ray3f:
+        """Rays through the pixels of the window, numbered row by row, at a point in [0, 1]^2."""
+        row = pixel // self.width
+        column = pixel - row * self.width
+        film_position = mi.Point2f(
+            (mi.Float(self.x + column) + jitter.x) / self.resolution,
+            (mi.Float(self.y + row) + jitter.y) / self.resolution,
+        )
+        ray, _ = scene.sensors()[0].sample_ray(0, 0, film_position, mi.Point2f(0.5))
+        return ray
+
+
+def _block_sums(values: list[mi.Float], samples: int) -> list[mi.Float]:
+    """Sums over the samples of each pixel, which lie side by side: no atomics, always the same."""
+    dr.eval(values)  # together: block_sum evaluates its input, each channel with its own kernel
+    sums = [dr.block_sum(value, samples) for value in values]
+    dr.eval(sums)
+    return sums
+
+
+def _pending(sums: list[mi.Float], window: Window, samples: int) -> Pending:
+    def read() -> NDArray[np.float32]:
+        mean = np.stack([np.asarray(channel) for channel in sums], axis=-1)
+        mean /= samples
+        return mean.reshape(window.height, window.width, len(sums))
+
+    return read

@@ -1,0 +1,158 @@
+"""Albedo and roughness of every BSDF that a camera ray can hit, without evaluating the BSDF.
+
+Mitsuba's own albedo AOV is view-dependent for rough conductors and zero for dielectrics, and it
+knows no roughness; here both are looked up in the BSDF's parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ngi.backend import dr, mi
+
+Lookup = Callable[..., Any]
+"""(hit: SurfaceInteraction3f, active: Bool) -> Color3f or Float."""
+
+_WRAPPERS = {"TwoSidedBRDF": "brdf_0", "BumpMap": "nested_bsdf", "NormalMap": "nested_bsdf"}
+_NEVER_HIT = ("Instance", "ShapeGroup")
+
+
+@dataclass(frozen=True)
+class Material:
+    """What the buffers need to know of one BSDF.
+
+    albedo: diffuse, specular or base reflectance, linear RGB; 1 where the BSDF absorbs nothing.
+    roughness: alpha; 1 for a diffuse BSDF and 0 for a perfectly smooth one.
+    constant_roughness: its value where it is the same everywhere, else None.
+    """
+
+    bsdf: mi.BSDF
+    albedo: Lookup
+    roughness: Lookup
+    constant_roughness: float | None
+
+
+def collect_materials(shapes: list[mi.Shape]) -> list[Material]:
+    """The materials of the shapes' BSDFs; ValueError for a BSDF of a kind that is not known."""
+    bsdfs: list[mi.BSDF] = []
+    for shape in shapes:
+        if shape.class_name() not in _NEVER_HIT and shape.bsdf() not in bsdfs:
+            bsdfs.append(shape.bsdf())
+    return [_material(bsdf) for bsdf in bsdfs]
+
+
+def evaluate_materials(
+    materials: list[Material], hit: mi.SurfaceInteraction3f, active: mi.Bool
+) -> tuple[mi.Color3f, mi.Float]:
+    """Albedo and roughness at a hit, zero where it is not active."""
+    albedo, roughness = mi.Color3f(0), mi.Float(0)
+    if mi.variant().startswith("scalar"):
+        if not active:  # asking a miss for its BSDF would crash
+            return albedo, roughness
+        material = next(material for material in materials if material.bsdf == hit.bsdf())
+        return material.albedo(hit, True), material.roughness(hit, True)
+    pointer = hit.bsdf()
+    for material in materials:
+        here = active & (pointer == mi.BSDFPtr(material.bsdf))
+        albedo = dr.select(here, material.albedo(hit, here), albedo)
+        roughness = dr.select(here, material.roughness(hit, here), roughness)
+    return albedo, roughness
+
+
+def _material(bsdf: mi.BSDF) -> Material:
+    inner, children = bsdf, _children(bsdf)
+    while inner.class_name() in _WRAPPERS:
+        inner = children[_WRAPPERS[inner.class_name()]]
+        children = _children(inner)
+    kind = inner.class_name()
+    if kind not in _KINDS:
+        raise ValueError(
+            f"BSDF '{bsdf.id()}' is of kind {kind}, whose albedo and roughness are not known; "
+            f"use one of {sorted(_KINDS)}, or add it to {__name__}"
+        )
+    albedo_name, roughness_of = _KINDS[kind]
+    roughness, constant = roughness_of(inner, children)
+    return Material(bsdf, _colour(children.get(albedo_name)), roughness, constant)
+
+
+def _children(bsdf: mi.BSDF) -> dict[str, mi.Object]:
+    """The BSDFs and textures directly inside a BSDF, by parameter name."""
+    children = {}
+
+    class Collect(mi.TraversalCallback):
+        def put(self, name: str, value: object, *_: object) -> None:
+            if isinstance(value, mi.Object):
+                children[name] = value
+
+    bsdf.traverse(Collect())
+    return children
+
+
+def _colour(texture: mi.Texture | None) -> Lookup:
+    if texture is None:
+        return lambda _hit, _active: mi.Color3f(1)
+    return lambda hit, active: mi.Color3f(texture.eval(hit, active))
+
+
+def _constant(value: float) -> tuple[Lookup, float | None]:
+    return lambda _hit, _active: mi.Float(value), value
+
+
+def _diffuse(_bsdf: mi.BSDF, _children: dict[str, mi.Object]) -> tuple[Lookup, float | None]:
+    return _constant(1.0)
+
+
+def _smooth(_bsdf: mi.BSDF, _children: dict[str, mi.Object]) -> tuple[Lookup, float | None]:
+    return _constant(0.0)
+
+
+def _rough(bsdf: mi.BSDF, children: dict[str, mi.Object]) -> tuple[Lookup, float | None]:
+    """Alpha as a texture, two anisotropic ones (their mean), or a plain number."""
+    names = [name for name in ("alpha", "alpha_u", "alpha_v") if name in children]
+    if not names:
+        parameters = mi.traverse(bsdf)
+        return lambda _hit, _active: mi.Float(parameters["alpha"]), _number(parameters["alpha"])
+    textures = [children[name] for name in names]
+
+    def roughness(hit: mi.SurfaceInteraction3f, active: mi.Bool) -> mi.Float:
+        return sum(texture.eval_1(hit, active) for texture in textures) / len(textures)
+
+    return roughness, _mean_of_uniform(textures)
+
+
+def _principled(_bsdf: mi.BSDF, children: dict[str, mi.Object]) -> tuple[Lookup, float | None]:
+    """Disney's parametrisation: alpha is the square of the artist's roughness."""
+    texture = children["roughness"]
+    constant = _mean_of_uniform([texture])
+    return (
+        lambda hit, active: dr.square(texture.eval_1(hit, active)),
+        None if constant is None else constant**2,
+    )
+
+
+def _mean_of_uniform(textures: list[mi.Texture]) -> float | None:
+    if any(texture.class_name() != "UniformSpectrum" for texture in textures):
+        return None
+    return sum(_number(mi.traverse(texture)["value"]) for texture in textures) / len(textures)
+
+
+def _number(value: mi.Float) -> float:
+    return float(np.array(value).reshape(-1)[0])
+
+
+_KINDS: dict[str, tuple[str, Callable[..., tuple[Lookup, float | None]]]] = {
+    "SmoothDiffuse": ("reflectance", _diffuse),
+    "SmoothConductor": ("specular_reflectance", _smooth),
+    "RoughConductor": ("specular_reflectance", _rough),
+    "SmoothDielectric": ("specular_transmittance", _smooth),
+    "ThinDielectric": ("specular_transmittance", _smooth),
+    "RoughDielectric": ("specular_transmittance", _rough),
+    "SmoothPlastic": ("diffuse_reflectance", _smooth),
+    "RoughPlastic": ("diffuse_reflectance", _rough),
+    "Principled": ("base_color", _principled),
+}
+"""Class of the BSDF -> its texture that is the albedo (1 where it has none), and its roughness."""

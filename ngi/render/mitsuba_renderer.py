@@ -1,0 +1,206 @@
+"""Renders patches and images of a variable scene with Mitsuba 3."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from ngi.backend import activate, describe, mi
+from ngi.render.first_hit import first_hit_of
+from ngi.render.jit_tracer import JitTracer
+from ngi.render.protocol import RenderedImage, RenderedPatches
+from ngi.render.render_inputs import check_states, patch_window, require_positive
+from ngi.render.scalar_tracer import ScalarTracer
+from ngi.render.tracing import Pending, Tracer, Window, derive_seed
+from ngi.scene import read_scene
+from ngi.scene.variable_scene import VariableScene
+
+PATHS_PER_LAUNCH = 2**22
+"""Images are traced in launches of at most this many paths: about 200 MB."""
+
+SAMPLES_PER_PASS = 256
+"""Samples of an image's pixel that are summed in single precision before double takes over."""
+
+BUFFER_SAMPLES = {"cuda_ad_rgb": 16, "llvm_ad_rgb": 16, "scalar_rgb": 2}
+"""Samples per pixel of the buffers by default; a Python loop takes them in the scalar variant."""
+
+_logger = logging.getLogger(__name__)
+
+
+class MitsubaRenderer:
+    """The `ngi.render.Renderer` of a scene folder (paper, Sec. 4 and 6).
+
+    scene: folder with scene.yaml and scene.xml.
+    backend: 'auto', 'cuda', 'llvm' or 'scalar', see `ngi.backend.activate`.
+    patch_size: P, pixels along a patch's side.
+    samples_per_pixel: of training patches; the scene's own number where None.
+    buffer_samples: rays per pixel of the buffers; `BUFFER_SAMPLES` where None.
+
+    Radiance and buffers are box-filtered, means over the pixel's square. The buffers use the same
+    sub-pixel points in every pixel and no random numbers, so they do not depend on the seed. A
+    patch's random numbers depend on seed and state alone, not on the rest of the batch.
+
+    Raises ValueError or FileNotFoundError for a bad scene and RuntimeError for a backend that
+    does not work here, before anything is rendered.
+    """
+
+    def __init__(
+        self,
+        *,
+        scene: Path | str,
+        backend: str = "auto",
+        patch_size: int = 32,
+        samples_per_pixel: int | None = None,
+        buffer_samples: int | None = None,
+    ) -> None:
+        given = {"samples_per_pixel": samples_per_pixel, "buffer_samples": buffer_samples}
+        require_positive(
+            patch_size=patch_size, **{name: n for name, n in given.items() if n is not None}
+        )
+        scene_description = read_scene(scene)
+        self._variant = activate(backend)
+        self._scene = VariableScene(scene_description)
+        self._require_square_film()
+        first_hit = first_hit_of(self._scene)
+        buffer_samples = buffer_samples or BUFFER_SAMPLES[self._variant]
+        loaded = self._scene.scene
+        self._patch_tracer: Tracer
+        self._image_tracer: Tracer
+        if self._variant == "scalar_rgb":
+            self._patch_tracer = self._image_tracer = ScalarTracer(
+                scene=loaded, first_hit=first_hit, buffer_samples=buffer_samples
+            )
+        else:
+            self._patch_tracer, self._image_tracer = (
+                JitTracer(
+                    scene=loaded, first_hit=first_hit, buffer_samples=buffer_samples, frozen=frozen
+                )
+                for frozen in (True, False)
+            )
+        self.layout = first_hit.layout
+        self.dimensions = scene_description.dimensions
+        self.patch_size = patch_size
+        self.samples_per_pixel = samples_per_pixel or scene_description.samples_per_pixel
+        self.scene_hash = scene_description.scene_hash
+        self.description = describe(self._variant)
+
+    def render_patches(self, states: Tensor, *, resolution: int, seed: int) -> RenderedPatches:
+        """See `ngi.render.Renderer.render_patches`.
+
+        All patches are launched before the first is read, so that Python's part of the work
+        runs beside the tracing where the scene's update does not have to wait for it.
+        """
+        check_states(states, self.dimensions)
+        mi.set_variant(self._variant)
+        pending = [self._launch_patch(state, resolution, seed, attempt=0) for state in states]
+        results, repaired, masked, renderings = [], 0, 0, len(states)
+        for state, (radiance, buffers) in zip(states, pending, strict=True):
+            patch = radiance(), buffers()
+            if not _finite(*patch):
+                repaired, renderings = repaired + 1, renderings + 1
+                retry = self._launch_patch(state, resolution, seed, attempt=1)
+                patch = retry[0](), retry[1]()
+                if not _finite(*patch):
+                    masked += 1
+                    patch = _masked(patch[0]), _masked(patch[1])
+            results.append(patch)
+        P = self.patch_size
+        radiance_tensor = _stack([r for r, _ in results], (P, P, 3))
+        buffer_tensor = _stack([b for _, b in results], (P, P, self.layout.channels))
+        return RenderedPatches(
+            buffers=self._encode(buffer_tensor),
+            log_radiance=torch.log1p(radiance_tensor),
+            repaired=repaired,
+            masked=masked,
+            paths=renderings * P * P * self.samples_per_pixel,
+        )
+
+    def render_image(
+        self, scene_vector: Tensor, *, resolution: int, samples_per_pixel: int, seed: int
+    ) -> RenderedImage:
+        """See `ngi.render.Renderer.render_image`; memory does not grow with the samples.
+
+        Bands of rows are rendered in passes of at most `SAMPLES_PER_PASS`, summed in double
+        precision. A pass with NaN or Inf is rendered again, then masked, with a warning.
+        """
+        require_positive(resolution=resolution, samples_per_pixel=samples_per_pixel)
+        mi.set_variant(self._variant)
+        self._scene.apply(scene_vector)
+        state = np.asarray(scene_vector, dtype=np.float32).tobytes()
+        radiance, buffers = [], []
+        for band in _bands(resolution, min(samples_per_pixel, SAMPLES_PER_PASS)):
+            total = np.zeros((band.height, resolution, 3))
+            for start in range(0, samples_per_pixel, SAMPLES_PER_PASS):
+                samples = min(SAMPLES_PER_PASS, samples_per_pixel - start)
+                place = (seed, state, resolution, band.y, start)
+                total += samples * self._radiance_pass(band, samples, place).astype(np.float64)
+            radiance.append(total / samples_per_pixel)
+            buffers.append(_masked(self._image_tracer.buffers(band)()))
+        return RenderedImage(
+            buffers=self._encode(torch.from_numpy(np.concatenate(buffers))),
+            radiance=torch.from_numpy(np.concatenate(radiance).astype(np.float32)),
+        )
+
+    def hard_frames(self) -> Tensor:
+        """[10, D]: the scene's hard test frames (paper, Sec. 7.2.1)."""
+        return torch.tensor(self._scene.description.hard_frames, dtype=torch.float32)
+
+    def _launch_patch(
+        self, state: Tensor, resolution: int, seed: int, *, attempt: int
+    ) -> tuple[Pending, Pending]:
+        window = patch_window(state[-2:], patch_size=self.patch_size, resolution=resolution)
+        self._scene.apply(state[:-2])
+        number = derive_seed(seed, state.numpy().tobytes(), resolution, attempt)
+        radiance = self._patch_tracer.radiance(window, samples=self.samples_per_pixel, seed=number)
+        return radiance, self._patch_tracer.buffers(window)
+
+    def _radiance_pass(
+        self, band: Window, samples: int, place: tuple[int | bytes, ...]
+    ) -> NDArray[np.float32]:
+        for attempt in range(2):
+            number = derive_seed(*place, attempt)
+            radiance = self._image_tracer.radiance(band, samples=samples, seed=number)()
+            if _finite(radiance):
+                return radiance
+        _logger.warning("an image's rows from %d hold NaN or Inf, which were set to zero", band.y)
+        return _masked(radiance)
+
+    def _encode(self, buffers: Tensor) -> Tensor:
+        """Emission becomes log1p of its mean, in place."""
+        if "emission" in self.layout.names:
+            buffers[..., self.layout.slice("emission")].log1p_()
+        return buffers
+
+    def _require_square_film(self) -> None:
+        width, height = self._scene.scene.sensors()[0].film().size()
+        if width != height:
+            raise ValueError(
+                f"{self._scene.description.scene_file}: the film is {width} x {height}; make width "
+                "and height equal, since the virtual image is a square"
+            )
+
+
+def _bands(resolution: int, samples: int) -> list[Window]:
+    rows = min(resolution, max(1, PATHS_PER_LAUNCH // (resolution * samples)))
+    return [
+        Window(0, y, resolution, min(rows, resolution - y), resolution)
+        for y in range(0, resolution, rows)
+    ]
+
+
+def _finite(*arrays: NDArray[np.float32]) -> bool:
+    return all(bool(np.isfinite(array).all()) for array in arrays)
+
+
+def _masked(array: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Every pixel that holds a NaN or Inf set to zero, in all of its channels."""
+    return np.where(np.isfinite(array).all(axis=-1, keepdims=True), array, np.float32(0))
+
+
+def _stack(arrays: list[NDArray[np.float32]], shape: tuple[int, ...]) -> Tensor:
+    return torch.from_numpy(np.stack(arrays)) if arrays else torch.empty(0, *shape)

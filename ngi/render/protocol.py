@@ -1,0 +1,71 @@
+"""What every renderer of variable scenes offers; Mitsuba's and the analytic one implement it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from torch import Tensor
+
+from ngi.patches import BufferLayout
+
+
+@dataclass(frozen=True)
+class RenderedPatches:
+    """buffers: [n, P, P, C] float32; log_radiance: [n, P, P, 3] float32, log1p of linear RGB.
+
+    repaired: number of patches that held NaN or Inf and were rendered again with another seed.
+    masked: number of patches that still held such pixels, which were then set to zero.
+    paths: number of camera paths traced for the radiance.
+    """
+
+    buffers: Tensor
+    log_radiance: Tensor
+    repaired: int
+    masked: int
+    paths: int
+
+
+@dataclass(frozen=True)
+class RenderedImage:
+    """buffers: [H, W, C] float32; radiance: [H, W, 3] float32, linear RGB."""
+
+    buffers: Tensor
+    radiance: Tensor
+
+
+class Renderer(Protocol):
+    """Renders a variable scene: scene vector, patch and resolution in, buffers and radiance out."""
+
+    layout: BufferLayout
+    dimensions: int
+    """D, the number of scene variables."""
+    patch_size: int
+    """P, pixels along a patch's side."""
+    samples_per_pixel: int
+    """spp of training patches."""
+    scene_hash: str
+    """Content hash of the scene's files; part of a run's identity and of a reference's name."""
+    description: str
+    """One line for logs and result files: backend, variant, LLVM or GPU."""
+
+    def render_patches(self, states: Tensor, *, resolution: int, seed: int) -> RenderedPatches:
+        """Traces one patch per state; only its own pixels.
+
+        states: [n, D + 2] in [0, 1]: the scene vector, then the patch position (x, y). The patch's
+        first pixel column is floor(x * (resolution - P + 1)), clamped to the last one; rows alike.
+        The same states, resolution and seed give the same numbers bit for bit on the same machine.
+        Raises ValueError for states of the wrong length or outside [0, 1], or a patch larger than
+        the image.
+        """
+        ...
+
+    def render_image(
+        self, scene_vector: Tensor, *, resolution: int, samples_per_pixel: int, seed: int
+    ) -> RenderedImage:
+        """Renders a whole image of resolution x resolution pixels for one v of shape [D]."""
+        ...
+
+    def hard_frames(self) -> Tensor:
+        """[10, D]: the scene's hard test frames (paper, Sec. 7.2.1)."""
+        ...

@@ -1,0 +1,77 @@
+"""Tracing without a JIT compiler: Mitsuba's scalar variant, for machines without a good LLVM."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ngi.backend import mi
+from ngi.render.first_hit import FirstHit
+from ngi.render.tracing import Pending, Window, subpixel_points
+
+
+class ScalarTracer:
+    """The `ngi.render.tracing.Tracer` of scalar_rgb.
+
+    Radiance is Mitsuba's own compiled rendering loop over the crop window of a box-filtered copy
+    of the scene's camera; the buffers are a Python loop over pixels, so that few samples pay.
+    """
+
+    def __init__(self, *, scene: mi.Scene, first_hit: FirstHit, buffer_samples: int) -> None:
+        self._scene = scene
+        self._first_hit = first_hit
+        self._points = subpixel_points(buffer_samples)
+        self._sensor = _box_filtered_copy(scene.sensors()[0])
+        self._film = mi.traverse(self._sensor)
+
+    def radiance(self, window: Window, *, samples: int, seed: int) -> Pending:
+        # A film given a new size takes all of it as its crop window, but keeps the old offset.
+        self._film["film.size"] = [window.resolution, window.resolution]
+        self._film["film.crop_offset"] = [0, 0]
+        self._film.update()
+        self._film["film.crop_size"] = [window.width, window.height]
+        self._film["film.crop_offset"] = [window.x, window.y]
+        self._film.update()
+        image = mi.render(self._scene, sensor=self._sensor, seed=seed, spp=samples)
+        result = np.array(image, dtype=np.float32)
+        return lambda: result
+
+    def buffers(self, window: Window) -> Pending:
+        means = [
+            self._pixel(window.x + column, window.y + row, window.resolution)
+            for row in range(window.height)
+            for column in range(window.width)
+        ]
+        result = np.array(means, dtype=np.float32).reshape(window.height, window.width, -1)
+        return lambda: result
+
+    def _pixel(self, x: int, y: int, resolution: int) -> NDArray[np.float64]:
+        sensor = self._scene.sensors()[0]
+        samples = []
+        for point in (self._points + np.array([x, y])) / resolution:
+            ray, _ = sensor.sample_ray(0, 0, mi.Point2f(point), mi.Point2f(0.5))
+            samples.append(self._first_hit.channels(self._scene, ray))
+        return np.mean(np.array(samples, dtype=np.float64), axis=0)
+
+
+def _box_filtered_copy(sensor: mi.Sensor) -> mi.Sensor:
+    """The scene's perspective camera with a film of our own."""
+    parameters = mi.traverse(sensor)
+    return mi.load_dict(
+        {
+            "type": "perspective",
+            "fov": parameters["x_fov"],
+            "fov_axis": "x",
+            "near_clip": parameters["near_clip"],
+            "far_clip": parameters["far_clip"],
+            "principal_point_offset_x": parameters["principal_point_offset_x"],
+            "principal_point_offset_y": parameters["principal_point_offset_y"],
+            "to_world": parameters["to_world"],
+            "film": {
+                "type": "hdrfilm",
+                "pixel_format": "rgb",
+                "component_format": "float32",
+                "rfilter": {"type": "box"},
+            },
+        }
+    )

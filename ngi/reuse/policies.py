@@ -1,0 +1,218 @@
+"""Whether the next batch is generated or reused (paper, Sec. 6.1)."""
+
+# ruff: noqa: ARG002 - a policy is told more than it need look at
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Protocol, Self
+
+from torch import Tensor
+
+
+@dataclass(frozen=True)
+class PolicyState:
+    """What a policy knows; checkpointed, and logged at every step.
+
+    generated_batches: how many generated batches `update` has been told of
+    existing_loss: L_exist, moving average of the loss of reused samples; None before there is one
+    new_loss: L_new, the same of newly generated samples
+    """
+
+    generated_batches: int = 0
+    existing_loss: float | None = None
+    new_loss: float | None = None
+
+    def state_dict(self) -> dict[str, Any]:
+        """Plain data, for a checkpoint."""
+        return asdict(self)
+
+    @classmethod
+    def from_state_dict(cls, state: dict[str, Any]) -> Self:
+        """The inverse of `state_dict`."""
+        return cls(**state)
+
+
+class ReusePolicy(Protocol):
+    """Gives the probability with which the next batch is a reused one."""
+
+    def init(self) -> PolicyState:
+        """The state at the start of a run."""
+        ...
+
+    def probability(
+        self, state: PolicyState, *, generated_batches: int, store_size: int, store_capacity: int
+    ) -> float:
+        """p_s in [0, 1]; 0 as long as the store is empty.
+
+        generated_batches: number of batches generated so far
+        store_size, store_capacity: in patches
+        """
+        ...
+
+    def update(
+        self, state: PolicyState, *, reused: bool, losses: Tensor, large_step: Tensor
+    ) -> PolicyState:
+        """The state after a batch was trained on.
+
+        reused: whether the batch was reused or generated
+        losses: [n], before the optimiser's step; large_step: [n] bool, as stored with the patches
+        """
+        ...
+
+
+class _Stateless:
+    """What the policies without averages share: they count, and look at no loss."""
+
+    def init(self) -> PolicyState:
+        """See `ReusePolicy`."""
+        return PolicyState()
+
+    def update(
+        self,
+        state: PolicyState,
+        *,
+        reused: bool,
+        losses: Tensor,
+        large_step: Tensor,
+    ) -> PolicyState:
+        """See `ReusePolicy`."""
+        return replace(state, generated_batches=state.generated_batches + (not reused))
+
+
+class Never(_Stateless):
+    """Generates every batch: the paper's test of the samples' distribution (Sec. 5.1)."""
+
+    def probability(
+        self,
+        state: PolicyState,
+        *,
+        generated_batches: int,
+        store_size: int,
+        store_capacity: int,
+    ) -> float:
+        """See `ReusePolicy`."""
+        return 0.0
+
+
+class UntilFull(_Stateless):
+    """Generates until the store is full and reuses from then on: a data set made beforehand."""
+
+    def probability(
+        self,
+        state: PolicyState,
+        *,
+        generated_batches: int,
+        store_size: int,
+        store_capacity: int,
+    ) -> float:
+        """See `ReusePolicy`."""
+        return 1.0 if store_size >= store_capacity else 0.0
+
+
+class FixedProbability(_Stateless):
+    """Reuses with one probability, once `bootstrap_batches` batches were generated."""
+
+    def __init__(self, *, bootstrap_batches: int, probability: float) -> None:
+        _check_bootstrap(bootstrap_batches)
+        if not 0 <= probability <= 1:
+            raise ValueError(f"probability: {probability}: give a number in [0, 1]")
+        self._bootstrap_batches = bootstrap_batches
+        self._probability = probability
+
+    def probability(
+        self,
+        state: PolicyState,
+        *,
+        generated_batches: int,
+        store_size: int,
+        store_capacity: int,
+    ) -> float:
+        """See `ReusePolicy`."""
+        if store_size == 0 or generated_batches < self._bootstrap_batches:
+            return 0.0
+        return self._probability
+
+
+class SelfTuning:
+    """Reuses with probability p_s = sigmoid(L_exist - L_new + beta) (paper, Sec. 6.1, Eq. 5).
+
+    When the network does better on what it has seen than on what is new, p_s falls.
+
+    bootstrap_batches: number of batches that are generated first (paper: 100)
+    beta: the paper's 4.6 makes p_s 0.99 where both losses are equal
+    ema_coefficient: weight of the average's old value, in [0, 1); the paper gives none, the
+        release has 0.9
+
+    L_exist and L_new are exponential moving averages of a batch's mean loss over its large-step
+    samples; NaN and infinite losses are left out, and a batch that has no sample left changes
+    nothing. As in the release both start at the loss at the end of the bootstrap: during it they
+    are the latest batch's loss. Until there is a loss at all, p_s is 0.
+    """
+
+    def __init__(self, *, bootstrap_batches: int, beta: float, ema_coefficient: float) -> None:
+        _check_bootstrap(bootstrap_batches)
+        if not math.isfinite(beta):
+            raise ValueError(f"beta: {beta}: give a finite number")
+        if not 0 <= ema_coefficient < 1:
+            raise ValueError(f"ema_coefficient: {ema_coefficient}: give a number in [0, 1)")
+        self._bootstrap_batches = bootstrap_batches
+        self._beta = beta
+        self._ema_coefficient = ema_coefficient
+
+    def init(self) -> PolicyState:
+        """See `ReusePolicy`."""
+        return PolicyState()
+
+    def probability(
+        self,
+        state: PolicyState,
+        *,
+        generated_batches: int,
+        store_size: int,
+        store_capacity: int,
+    ) -> float:
+        """See `ReusePolicy`."""
+        if store_size == 0 or generated_batches < self._bootstrap_batches:
+            return 0.0
+        if state.existing_loss is None or state.new_loss is None:
+            return 0.0
+        return _sigmoid(state.existing_loss - state.new_loss + self._beta)
+
+    def update(
+        self, state: PolicyState, *, reused: bool, losses: Tensor, large_step: Tensor
+    ) -> PolicyState:
+        """See `ReusePolicy`. Raises ValueError where losses and large_step differ in shape."""
+        if losses.shape != large_step.shape:
+            raise ValueError(
+                f"large_step: shape {list(large_step.shape)}: give one per loss, "
+                f"{list(losses.shape)}"
+            )
+        state = replace(state, generated_batches=state.generated_batches + (not reused))
+        losses = losses.detach().double().cpu()
+        losses = losses[large_step.cpu() & losses.isfinite()]
+        if len(losses) == 0:
+            return state
+        loss = losses.mean().item()
+        bootstrapping = not reused and state.generated_batches <= self._bootstrap_batches
+        if bootstrapping or state.existing_loss is None or state.new_loss is None:
+            return replace(state, existing_loss=loss, new_loss=loss)
+        if reused:
+            return replace(state, existing_loss=self._average(state.existing_loss, loss))
+        return replace(state, new_loss=self._average(state.new_loss, loss))
+
+    def _average(self, old: float, loss: float) -> float:
+        return self._ema_coefficient * old + (1 - self._ema_coefficient) * loss
+
+
+def _sigmoid(x: float) -> float:
+    """1 / (1 + exp(-x)), without overflow."""
+    if x >= 0:
+        return 1 / (1 + math.exp(-x))
+    return math.exp(x) / (1 + math.exp(x))
+
+
+def _check_bootstrap(bootstrap_batches: int) -> None:
+    if bootstrap_batches < 0:
+        raise ValueError(f"bootstrap_batches: {bootstrap_batches}: give at least 0")

@@ -1,0 +1,94 @@
+"""Reading a YAML mapping key by key, with errors that name file, key and value."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+Vector = tuple[float, ...]
+
+
+def load_yaml(path: Path) -> dict[str, Any]:
+    """Raises ValueError, naming the line, where the YAML is broken."""
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except yaml.MarkedYAMLError as error:
+        line = error.problem_mark.line + 1 if error.problem_mark else "?"
+        raise ValueError(f"{path}, line {line}: broken YAML: {error.problem}") from None
+    if not isinstance(content, dict):
+        raise ValueError(f"{path}: expected keys and values, got {type(content).__name__}")
+    return content
+
+
+@dataclass
+class YamlKeys:
+    """The keys of one mapping of the YAML; each is taken once, and none may be left over."""
+
+    path: Path
+    prefix: str
+    values: Any
+    taken: set[str] = field(default_factory=set)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.values, dict):
+            place = self.prefix.rstrip(".")
+            raise ValueError(f"{self.path}: {place} is {self.values!r}; expected keys and values")
+
+    def __contains__(self, key: str) -> bool:
+        return key in self.values
+
+    def error(self, key: str, value: object, advice: str) -> ValueError:
+        return ValueError(f"{self.path}: {self.prefix}{key} is {value!r}; {advice}")
+
+    def take(self, key: str, kind: type) -> Any:
+        if key not in self.values:
+            raise ValueError(f"{self.path}: {self.prefix}{key} is missing; add it")
+        self.taken.add(key)
+        value = self.values[key]
+        if not isinstance(value, kind) or isinstance(value, bool):
+            raise self.error(key, value, f"expected {kind.__name__}")
+        return value
+
+    def positive_integer(self, key: str) -> int:
+        value: int = self.take(key, int)
+        if value < 1:
+            raise self.error(key, value, "expected a positive integer")
+        return value
+
+    def numbers(self, key: str, *, length: int) -> Vector:
+        value = self.take(key, object)
+        numbers = value if isinstance(value, list) else [value]
+        if len(numbers) != length or not all(map(_is_finite_number, numbers)):
+            raise self.error(key, value, f"expected {length} finite number(s)")
+        return tuple(map(float, numbers))
+
+    def frames(self, key: str, *, dimensions: int) -> tuple[Vector, ...]:
+        """A list of at least one scene vector."""
+        frames = self.take(key, list)
+        if not frames:
+            raise self.error(key, frames, "give at least one frame")
+        keys = YamlKeys(self.path, self.prefix, {f"{key}[{i}]": f for i, f in enumerate(frames)})
+        vectors = [keys.numbers(name, length=dimensions) for name in keys.values]
+        for name, vector in zip(keys.values, vectors, strict=True):
+            if not all(0 <= number <= 1 for number in vector):
+                raise self.error(name, list(vector), "every component of v lies between 0 and 1")
+        return tuple(vectors)
+
+    def check_range(self, low: Vector, high: Vector) -> None:
+        if not all(a < b for a, b in zip(low, high, strict=True)):
+            raise self.error("maximum", list(high), f"each must be above minimum {list(low)}")
+
+    def finish(self) -> None:
+        for key in self.values.keys() - self.taken:
+            near = get_close_matches(str(key), sorted(self.taken), n=1)
+            advice = f"did you mean '{near[0]}'?" if near else f"known are {sorted(self.taken)}"
+            raise ValueError(f"{self.path}: unknown key '{self.prefix}{key}'; {advice}")
+
+
+def _is_finite_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)

@@ -1,0 +1,141 @@
+"""Trains one run from a Hydra configuration: `python -m ngi.train --help`."""
+
+from __future__ import annotations
+
+import logging
+import os
+from pathlib import Path
+from typing import Any
+
+import hydra
+from hydra.core.config_store import ConfigStore
+from hydra.utils import instantiate
+from omegaconf import DictConfig, OmegaConf
+
+import ngi
+from ngi.resources import cache_folder, root, scene_folders
+from ngi.run_name import run_name
+
+log = logging.getLogger(__name__)
+
+IRRELEVANT = ("run", "tracker", "label")
+"""Parts of the configuration that do not decide a run's result, and so are not its identity."""
+
+
+def train(config: DictConfig) -> dict[str, Any]:
+    """Runs, or resumes, the run that `config` describes and returns its result.
+
+    A finished run is not run again. Raises ValueError for a configuration, scene, folder or
+    checkpoint that does not fit, before any long work.
+    """
+    from ngi import learn  # PyTorch and Lightning take seconds that --help need not wait for
+
+    budget = instantiate(config.budget)
+    renderer = instantiate(config.renderer)
+    settings = _settings(config, scene_hash=renderer.scene_hash)
+    folder = learn.RunFolder(Path(config.run.folder), settings=settings)
+    tracker = instantiate(config.tracker)
+    try:
+        if folder.result is not None:
+            log.info("%s is finished already; delete the folder to run it again", folder.path)
+            return folder.result
+        clock = learn.PhaseClock()
+        stream = learn.TrainingStream(
+            renderer=renderer,
+            sampler=instantiate(config.sampler),
+            store=instantiate(config.reuse.store)(layout=renderer.layout),
+            archive=learn.PatchArchive(folder.patches),
+            policy=instantiate(config.reuse.policy),
+            schedule=instantiate(config.resolution),
+            clock=clock,
+            seed=config.seed,
+        )
+        module = learn.IlluminationModule(
+            network=learn.seeded(instantiate(config.model), seed=config.seed)(
+                layout=renderer.layout, scene_dimensions=renderer.dimensions
+            ),
+            loss=instantiate(config.loss),
+            optimizer=instantiate(config.optimizer),
+            target=stream.sampler.target,
+            clock=clock,
+        )
+        label = {**_plain(config.label), "seed": config.seed}
+        recorder = learn.Recorder(
+            evaluator=instantiate(config.evaluation.evaluator)(renderer=renderer),
+            predict=module.predict,
+            folder=folder,
+            stream=stream,
+            clock=clock,
+            tracker=tracker,
+            label=label,
+            backend=renderer.description,
+        )
+        trainer = instantiate(config.trainer)(
+            max_steps=budget.maximum_steps,
+            callbacks=learn.callbacks(
+                stream=stream,
+                clock=clock,
+                folder=folder,
+                tracker=tracker,
+                budget=budget,
+                recorder=recorder,
+                evaluations=config.evaluation.count,
+                checkpoint_seconds=config.run.checkpoint_seconds,
+                checkpoint_steps=config.run.checkpoint_steps,
+            ),
+            plugins=[learn.AtomicCheckpointIO(identity=folder.identity)],
+        )
+        resume_from = learn.prepare_resume(folder)
+        recorder.prepare()
+        tracker.start(folder=folder.path, settings=settings, label=label)
+        trainer.fit(module, learn.ExplorationDataModule(stream=stream), ckpt_path=resume_from)
+        return recorder.finish()
+    finally:
+        tracker.finish()
+        folder.close()
+
+
+def _plain(config: DictConfig) -> dict[str, Any]:
+    plain = OmegaConf.to_container(config, resolve=True, throw_on_missing=True)
+    assert isinstance(plain, dict)
+    return {str(key): value for key, value in plain.items()}
+
+
+def _settings(config: DictConfig, *, scene_hash: str) -> dict[str, Any]:
+    """What decides the result. The scene counts by its content, not by where it lies."""
+    settings = {key: value for key, value in _plain(config).items() if key not in IRRELEVANT}
+    settings["scene"] = {"name": config.scene.name, "hash": scene_hash}
+    settings["renderer"].pop("scene", None)
+    settings["version"] = ngi.__version__
+    return settings
+
+
+def register() -> None:
+    """Makes scene folders options of the group `scene`, and the resolvers known to OmegaConf."""
+    os.environ["NGI_ROOT"] = str(root())
+    store = ConfigStore.instance()
+    for name, folder in scene_folders().items():
+        store.store(group="scene", name=name, node={"name": name, "folder": str(folder)})
+    OmegaConf.register_new_resolver("run_name", run_name, replace=True)
+    OmegaConf.register_new_resolver("cache_folder", lambda: str(cache_folder()), replace=True)
+
+
+@hydra.main(version_base="1.3", config_path=str(root() / "conf"), config_name="train")
+def _main(config: DictConfig) -> None:
+    result = train(config)
+    hard = result["metrics"]["hard"]
+    log.info(
+        "%s: %s",
+        config.run.folder,
+        ", ".join(f"{name} {value['mean']:.4g}" for name, value in hard.items() if value),
+    )
+
+
+def main() -> None:
+    """Entry point of `python -m ngi.train` and `ngi-train`."""
+    register()
+    _main()
+
+
+if __name__ == "__main__":
+    main()

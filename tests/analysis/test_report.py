@@ -1,0 +1,173 @@
+import os
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import matplotlib
+import numpy as np
+import pandas as pd
+import pytest
+from PIL import Image
+
+from analysis.curves import error_curve
+from analysis.methods import name_methods
+from analysis.plots import COLOURS, method_styles
+from analysis.report import main
+from analysis.runs import Run, find_runs
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture
+def one_scene(make_run, tmp_path) -> Path:
+    for seed in range(2):
+        make_run(seed=seed)
+        make_run(seed=seed, sampler="mcmc_loss_step", quality=1.3)
+    return tmp_path / "runs"
+
+
+@pytest.fixture
+def two_scenes(one_scene, make_run) -> Path:
+    for seed in range(2):
+        make_run(scene="sphere-caustic", seed=seed)
+        make_run(scene="sphere-caustic", seed=seed, sampler="mcmc_loss_step", quality=1.3)
+    return one_scene
+
+
+def test_report_writes_everything_it_names(two_scenes, capsys) -> None:
+    settings = dict(matplotlib.rcParams)
+    assert main([str(two_scenes)]) == 0
+    assert dict(matplotlib.rcParams) == settings
+    output = capsys.readouterr()
+    assert output.err == ""
+    report = two_scenes / "report"
+    named = [Path(line.strip()) for line in output.out.split("Written:")[1].splitlines() if line]
+    expected = {"results.csv", "results.md", "results.tex", "mirror.png", "sphere-caustic.png"}
+    expected |= {f"error_{s}.{x}" for s in ("mirror", "sphere-caustic") for x in ("png", "svg")}
+    assert {file.name for file in named if file.is_file()} == expected
+    assert all(file.exists() for file in named)
+    assert max(map(len, output.out.split("Protocol")[0].splitlines())) <= 120
+    assert len(pd.read_csv(report / "results.csv")) == 2 * 3
+    ElementTree.parse(report / "error_mirror.svg")
+
+
+def test_report_again_is_the_same(one_scene) -> None:
+    def contents() -> dict[str, bytes]:
+        assert main([str(one_scene)]) == 0
+        files = sorted((one_scene / "report").rglob("*"))
+        return {file.name: file.read_bytes() for file in files if file.is_file()}
+
+    assert contents() == contents()
+
+
+def test_comparison_sheets_show_reference_and_both_methods(one_scene, tmp_path) -> None:
+    assert main([str(one_scene), "--output", str(tmp_path / "out")]) == 0
+    pictures = tmp_path / "out" / "pictures"
+    frames = sorted(file.name for file in (pictures / "mirror").iterdir())
+    assert frames == [f"hard_{index:02d}.png" for index in range(5)]
+    with Image.open(pictures / "mirror" / "hard_02.png") as sheet:
+        width, height = sheet.size
+        pixels = np.asarray(sheet.convert("RGB"))
+    assert width == 12 + 5 * (256 + 12)  # reference, two predictions, two error maps
+    source = one_scene / "mirror" / "uniform" / "seed=0" / "pictures" / "hard_02_reference.png"
+    with Image.open(source) as reference:
+        enlarged = np.asarray(reference).repeat(8, axis=0).repeat(8, axis=1)
+    assert np.array_equal(pixels[32 : 32 + 256, 12 : 12 + 256], enlarged)
+    with Image.open(pictures / "mirror.png") as overview:
+        # The third of the sheet is a row; the legend comes once.
+        assert overview.size == (width, 3 * (256 + 32) + height - (256 + 32))
+
+
+def test_overview_shows_where_methods_differ_most(one_scene, tmp_path) -> None:
+    assert main([str(one_scene), "--output", str(tmp_path)]) == 0
+    with Image.open(tmp_path / "pictures" / "mirror.png") as overview:
+        first = np.asarray(overview.crop((0, 0, overview.width, 256 + 32)))
+    with Image.open(tmp_path / "pictures" / "mirror" / "hard_03.png") as sheet:
+        expected = np.asarray(sheet.crop((0, 0, sheet.width, 256 + 32)))
+    assert np.array_equal(first, expected)  # the fixture's frame 3 has the largest spread
+
+
+def test_missing_pictures_are_a_warning(two_scenes, capsys) -> None:
+    (two_scenes / "mirror" / "uniform" / "seed=0" / "pictures" / "hard_01_error.png").unlink()
+    assert main([str(two_scenes)]) == 0
+    output = capsys.readouterr()
+    assert "warning: no comparison pictures of mirror" in output.err
+    assert "sphere-caustic.png" in output.out
+
+
+def test_left_out_runs_are_a_warning(one_scene, capsys) -> None:
+    folder = one_scene / "mirror" / "uniform" / "seed=0"
+    (folder / "result.json").unlink()
+    assert main([str(one_scene)]) == 0
+    assert f"warning: left out: {folder}: unfinished" in capsys.readouterr().err
+
+
+def test_why_lpips_is_empty_is_said(make_run, tmp_path, capsys) -> None:
+    make_run(lpips=False)
+    assert main([str(tmp_path)]) == 0
+    assert "LPIPS is empty: no AlexNet weights" in capsys.readouterr().out
+
+
+def test_what_cannot_be_reported_is_one_line_and_writes_nothing(make_run, tmp_path, capsys) -> None:
+    make_run(seed=0)
+    make_run(seed=1, change=lambda result: result["protocol"].update(identity="other"))
+    assert main([str(tmp_path / "runs")]) == 1
+    error = capsys.readouterr().err
+    assert error.startswith("error: runs of two protocols")
+    assert error.count("\n") == 1
+    assert not (tmp_path / "runs" / "report").exists()
+
+
+def test_method_keeps_its_colour_in_every_scene(two_scenes) -> None:
+    runs = name_methods(find_runs(two_scenes)[0])
+    styles = method_styles(runs)
+    assert [style["color"] for style in styles.values()] == list(COLOURS[:2])
+    mirror = [run for run in runs if run.scene == "mirror"]
+    assert method_styles(mirror) == styles
+
+
+def run_with(points: list[tuple[float, float | None]]) -> Run:
+    history = pd.DataFrame(points, columns=["run_seconds", "hard_mape"])
+    return Run(Path(), {}, history)
+
+
+def test_curve_averages_seeds_at_common_times() -> None:
+    first = run_with([(0.0, 4.0), (10.0, 2.0), (20.0, 1.0)])
+    second = run_with([(5.0, 8.0), (15.0, 4.0), (25.0, 2.0)])
+    curve = error_curve([first, second], "hard_mape")
+    assert curve is not None
+    assert curve.seconds.tolist() == [5.0, 10.0, 20.0]
+    assert curve.mean.tolist() == [(3 + 8) / 2, (2 + 6) / 2, (1 + 3) / 2]
+    assert curve.low.tolist() == [3.0, 2.0, 1.0]
+    assert curve.high.tolist() == [8.0, 6.0, 3.0]
+    assert curve.n == 2
+
+
+def test_curve_without_values_or_common_times_is_none() -> None:
+    run = run_with([(0.0, 1.0), (1.0, 0.5)])
+    assert error_curve([run], "hard_lpips") is None
+    assert error_curve([run, run_with([(0.0, None)])], "hard_mape") is None
+    assert error_curve([run, run_with([(5.0, 1.0)])], "hard_mape") is None
+
+
+def test_report_needs_neither_ngi_nor_torch_nor_mitsuba(one_scene) -> None:
+    program = """
+import sys
+
+class Blocker:
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in ("ngi", "torch", "mitsuba", "drjit", "lightning"):
+            raise AssertionError(f"analysis imports {name}")
+
+sys.meta_path.insert(0, Blocker())
+from analysis.report import main
+sys.exit(main(sys.argv[1:]))
+"""
+    environment = {**os.environ, "PYTHONPATH": str(REPOSITORY)}
+    subprocess.run(
+        [sys.executable, "-W", "error", "-c", program, str(one_scene)],
+        check=True,
+        env=environment,
+        capture_output=True,
+    )

@@ -1,0 +1,129 @@
+import math
+
+import pandas as pd
+import pytest
+
+from analysis.latex import escape, to_latex
+from analysis.methods import name_methods
+from analysis.runs import find_runs
+from analysis.statistics import Estimate, estimate
+from analysis.summary import compare, summarise, to_frame
+from analysis.tables import (
+    Cell,
+    Table,
+    comparison_table,
+    cost_table,
+    error_table,
+    format_estimate,
+    format_number,
+    to_markdown,
+    to_terminal,
+    worst_table,
+)
+
+
+@pytest.fixture
+def summaries(make_run, tmp_path):  # type: ignore[no-untyped-def]
+    for seed in range(3):
+        make_run(seed=seed)
+        make_run(seed=seed, sampler="mcmc_loss_step", quality=1.25)
+    return summarise(name_methods(find_runs(tmp_path)[0]))
+
+
+def test_summaries_are_the_means_over_the_seeds(summaries) -> None:
+    assert [s.method for s in summaries] == ["uniform", "mcmc_loss_step", "reference noise"]
+    uniform = summaries[0]
+    values = [run.result["metrics"]["hard"]["dssim"]["mean"] for run in uniform.runs]
+    assert len(values) == 3
+    assert uniform.values["hard_dssim"] == estimate(values)
+    assert uniform.values["hard_dssim_worst5"].mean == pytest.approx(2 * sum(values) / 3)
+    assert summaries[2].values["uniform_mae"] == Estimate(pytest.approx(0.005), None, 1)
+
+
+def test_lpips_of_some_runs_only_is_left_empty(make_run, tmp_path) -> None:
+    make_run(seed=0)
+    make_run(seed=1, lpips=False)
+    (uniform, noise) = summarise(name_methods(find_runs(tmp_path)[0]))
+    assert uniform.values["hard_lpips"] is None
+    assert noise.values["hard_lpips"] is not None
+    assert to_terminal(error_table([uniform])).splitlines()[3].split()[-1] == "–"
+
+
+def test_comparison_is_paired_and_relative_to_uniform(summaries, make_run, tmp_path) -> None:
+    (comparison,) = compare(summaries)
+    assert (comparison.baseline, comparison.other) == ("uniform", "mcmc_loss_step")
+    differences = []
+    for a, b in zip(summaries[0].runs, summaries[1].runs, strict=True):
+        assert a.seed == b.seed
+        values = [run.result["metrics"]["hard"]["mape"]["mean"] for run in (a, b)]
+        differences.append(values[1] / values[0] - 1)
+    result = comparison.differences["hard_mape"]
+    assert result.mean == pytest.approx(sum(differences) / 3)
+    assert f"{100 * result.mean:+.1f}" in to_terminal(comparison_table([comparison]))
+    make_run(sampler="mcmc_loss")
+    assert compare(summarise(name_methods(find_runs(tmp_path)[0]))) == []
+
+
+def test_frame_holds_every_number(summaries, tmp_path) -> None:
+    to_frame(summaries).to_csv(tmp_path / "results.csv", index=False)
+    frame = pd.read_csv(tmp_path / "results.csv")
+    row = frame[frame.method == "mcmc_loss_step"].iloc[0]
+    value = summaries[1].values["uniform_lpips_worst5"]
+    assert row["uniform_lpips_worst5"] == pytest.approx(value.mean)
+    assert row["uniform_lpips_worst5_interval"] == pytest.approx(value.half_width)
+    assert (row["seeds"], row["sampler"]) == ("0 1 2", "mcmc_loss_step")
+    assert row["paths_traced"] == 524288000
+    assert math.isnan(frame[frame.method == "reference noise"].iloc[0]["steps"])
+
+
+def test_the_best_mean_of_a_scene_is_marked(summaries) -> None:
+    lines = to_terminal(error_table(summaries)).splitlines()
+    marks = {line.split()[1]: line.count("*") for line in lines[3:]}
+    assert marks == {"uniform": 0, "mcmc_loss_step": 8, "reference": 0}
+    assert to_markdown(worst_table(summaries)).count("**") == 2 + 2 * 8
+    assert "*" not in to_terminal(cost_table(summaries))
+
+
+def test_numbers_have_three_significant_digits() -> None:
+    numbers = [0.1234, 0.01234, 1.234, 123.4, 0.0, 1e-9, math.nan]
+    texts = ["0.123", "0.0123", "1.23", "123", "0.000", "0.00000", "nan"]
+    assert [format_number(number) for number in numbers] == texts
+    assert format_estimate(Estimate(0.1234, 0.0456, 3)) == "0.123 ± 0.046"
+    assert format_estimate(Estimate(0.1234, None, 1)) == "0.123"
+
+
+def test_latex_is_escaped() -> None:
+    assert escape(r"a_b & 5 % of #1 {x} $ \ ~ ^") == (
+        r"a\_b \& 5 \% of \#1 \{x\} \$ \textbackslash{} \textasciitilde{} \textasciicircum{}"
+    )
+    rows = ((Cell("mcmc_loss"), Cell("0.1 ± 0.2", best=True)), (Cell("b&c"), Cell("–")))
+    text = to_latex(Table("Worst 5 %", ("method", "MAPE"), rows, 1))
+    assert r"\caption{Worst 5 \%}" in text
+    assert r"mcmc\_loss & \textbf{0.1 $\pm$ 0.2} \\" in text
+    assert r"b\&c & -- \\" in text
+
+
+def test_latex_groups_columns_and_its_rows_have_as_many_cells(summaries) -> None:
+    for table in (error_table(summaries), worst_table(summaries), cost_table(summaries)):
+        text = to_latex(table)
+        widths = {
+            line.count("&") + 1
+            for line in text.splitlines()
+            if line.endswith(r"\\") and "multicolumn" not in line
+        }
+        assert widths == {len(table.columns)}
+        assert text.count("{") == text.count("}")
+    text = to_latex(error_table(summaries))
+    assert r"\multicolumn{4}{c}{hard} & \multicolumn{4}{c}{uniform} \\" in text
+    assert r"\cmidrule(lr){4-7}\cmidrule(lr){8-11}" in text
+
+
+def test_tables_for_the_terminal_fit_it(summaries) -> None:
+    for name in ("hard", "uniform"):
+        for table in (error_table(summaries, [name]), worst_table(summaries, [name])):
+            assert max(map(len, to_terminal(table).splitlines())) <= 120
+
+
+def test_markdown_keeps_underscores_and_bars() -> None:
+    text = to_markdown(Table("T", ("a",), ((Cell("x_y|z"),),), 1))
+    assert r"x\_y\|z" in text

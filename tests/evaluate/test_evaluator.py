@@ -1,0 +1,183 @@
+import csv
+import dataclasses
+import json
+import math
+
+import numpy as np
+import pytest
+import torch
+from PIL import Image
+
+from ngi.evaluate import METRICS, SETS, Evaluator, ReferenceCache, error_picture, mape
+from ngi.evaluate.evaluation import worst_mean
+
+
+class MeanDistance:
+    """Stands where LPIPS does: any function of two pictures."""
+
+    available = True
+    reason = None
+
+    def __call__(self, prediction: torch.Tensor, reference: torch.Tensor) -> float:
+        return (prediction - reference).abs().mean().item()
+
+
+class NoLpips:
+    available = False
+    reason = "no weights here"
+
+
+@pytest.fixture
+def evaluator(renderer, protocol, tmp_path) -> Evaluator:
+    cache = ReferenceCache(tmp_path / "references")
+    return Evaluator(renderer=renderer, protocol=protocol, cache=cache, lpips=MeanDistance())
+
+
+def perfect(buffers: torch.Tensor, scene_vector: torch.Tensor) -> torch.Tensor:
+    assert scene_vector.shape == (3,)
+    return torch.log1p(buffers)  # the fake renderer's buffers are its noiseless radiance
+
+
+def test_perfect_prediction_scores_the_floor(evaluator) -> None:
+    result = evaluator.evaluate(perfect).result()
+    for name in SETS:
+        for metric in ("mape", "mae", "lpips"):
+            summary = result["metrics"][name][metric]
+            assert summary["mean"] == pytest.approx(summary["floor"], rel=0.05)
+
+
+def test_values_are_those_of_the_metrics(evaluator, renderer, protocol, tmp_path) -> None:
+    evaluation = evaluator.evaluate(lambda b, v: torch.log1p(b * (1 + v[0])))
+    result = evaluation.result()
+    cache = ReferenceCache(tmp_path / "references")
+    expected = []
+    for v in renderer.hard_frames():
+        reference = cache.get(renderer, protocol, v)
+        expected.append(mape(reference.buffers * (1 + v[0]), reference.radiance, 0.01))
+    frames = [frame for frame in result["frames"] if frame["set"] == "hard"]
+    assert [frame["mape"] for frame in frames] == pytest.approx(expected, rel=1e-5)
+    summary = result["metrics"]["hard"]["mape"]
+    assert summary["mean"] == pytest.approx(np.mean(expected), rel=1e-5)
+    assert summary["worst5"] == pytest.approx(max(expected), rel=1e-5)
+    assert evaluation.row()["hard_mape"] == summary["mean"]
+    assert evaluation.row()["hard_mape_worst5"] == summary["worst5"]
+
+
+def test_worst_mean_is_that_of_whole_frames() -> None:
+    assert worst_mean(range(10)) == 9
+    assert worst_mean(range(20)) == 19
+    assert worst_mean(range(21)) == 19.5
+    assert worst_mean(range(60)) == 58
+    assert math.isnan(worst_mean([3.0, math.nan, 1.0]))
+
+
+def test_gradients_are_off_and_references_rendered_once(evaluator, renderer) -> None:
+    weight = torch.ones(3, requires_grad=True)
+    first = evaluator.evaluate(lambda b, _: torch.log1p(b) * weight)
+    assert not any(p.requires_grad for p in first.predictions)
+    renderer.seeds.clear()
+    assert evaluator.evaluate(perfect).reference_hash == first.reference_hash
+    assert not renderer.seeds
+
+
+def test_reference_hash_follows_the_references(evaluator, protocol, renderer, tmp_path) -> None:
+    first = evaluator.evaluate(perfect).reference_hash
+
+    def hash_with(folder: str, noise: float) -> str:
+        renderer.noise = noise
+        other = Evaluator(
+            renderer=renderer,
+            protocol=protocol,
+            cache=ReferenceCache(tmp_path / folder),
+            lpips=NoLpips(),
+        )
+        return other.evaluate(perfect).reference_hash
+
+    assert hash_with("again", 0.5) == first
+    assert hash_with("other", 0.4) != first
+
+
+def test_without_lpips_its_columns_are_empty(renderer, protocol, tmp_path) -> None:
+    cache = ReferenceCache(tmp_path)
+    evaluator = Evaluator(renderer=renderer, protocol=protocol, cache=cache, lpips=NoLpips())
+    evaluation = evaluator.evaluate(perfect)
+    assert evaluation.row()["hard_lpips"] is None
+    assert evaluation.row()["uniform_lpips_worst5"] is None
+    result = evaluation.result()
+    assert result["metrics"]["hard"]["lpips"] is None
+    assert result["lpips_note"] == "no weights here"
+
+
+def test_row_and_result_can_be_written_and_have_fixed_keys(evaluator, tmp_path) -> None:
+    row = evaluator.evaluate(perfect).row()
+    expected = [
+        key
+        for name in SETS
+        for key in (
+            *(f"{name}_{m}{suffix}" for m in METRICS for suffix in ("", "_worst5")),
+            f"{name}_non_finite",
+        )
+    ]
+    assert list(row) == expected
+    with (tmp_path / "metrics.csv").open("w", newline="") as stream:
+        writer = csv.DictWriter(stream, list(row))
+        writer.writeheader()
+        writer.writerow(row)
+    json.dumps(evaluator.evaluate(perfect).result(), allow_nan=False)
+
+
+def test_non_finite_predictions_are_counted_and_make_the_metrics_so(evaluator) -> None:
+    def broken(buffers: torch.Tensor, scene_vector: torch.Tensor) -> torch.Tensor:
+        answer = torch.log1p(buffers)
+        if scene_vector[0] == 0:  # the first hard frame
+            answer[2:4, 5] = torch.nan
+            answer[0, 0] = 200.0  # expm1 overflows
+        return answer
+
+    evaluation = evaluator.evaluate(broken)
+    assert evaluation.result()["non_finite"] == {"hard": 3, "uniform": 0}
+    row = evaluation.row()
+    assert all(not math.isfinite(row[f"hard_{metric}"]) for metric in METRICS)
+    assert all(math.isfinite(row[f"uniform_{metric}"]) for metric in METRICS)
+
+
+def test_prediction_of_the_wrong_shape_is_refused(evaluator) -> None:
+    with pytest.raises(ValueError, match=r"\[33, 33, 1\], expected \[33, 33, 3\]"):
+        evaluator.evaluate(lambda b, _: b[..., :1])
+
+
+def test_every_frame_has_its_pictures(evaluator, tmp_path) -> None:
+    evaluator.evaluate(perfect).write_pictures(tmp_path / "pictures")
+    files = sorted(file.name for file in (tmp_path / "pictures").iterdir())
+    assert len(files) == 14 * 4
+    assert "hard_09_prediction.png" in files
+    assert "uniform_03.png" in files
+    with Image.open(tmp_path / "pictures" / "hard_00_error.png") as picture:
+        assert picture.size == (33, 33)
+        assert "(reference + 0.01)" in picture.text["scale"]
+        assert (picture.text["colour_map"], picture.text["maximum"]) == ("inferno", "1")
+    with Image.open(tmp_path / "pictures" / "hard_00.png") as sheet:
+        assert sheet.width > 3 * 33 * 7
+        assert sheet.height > 33 * 7
+
+
+def test_pictures_show_the_tone_mapped_radiance(evaluator, tmp_path) -> None:
+    evaluation = evaluator.evaluate(lambda b, _: torch.log1p(torch.full_like(b, 0.5)))
+    evaluation.write_pictures(tmp_path)
+    with Image.open(tmp_path / "hard_00_prediction.png") as picture:
+        assert np.unique(np.asarray(picture)).tolist() == [188]  # sRGB of linear 0.5
+
+
+def test_error_picture_is_fixed_in_scale_and_marks_what_is_not_finite() -> None:
+    reference = torch.full((1, 4, 3), 0.99)
+    prediction = torch.tensor([0.99, 1.995, 5.0, torch.nan]).view(1, 4, 1).expand(1, 4, 3)
+    picture = error_picture(prediction, reference, epsilon=0.01)[0].tolist()
+    assert picture[0] == [0, 0, 3]  # inferno's ends
+    assert picture[1] == picture[2] == [252, 254, 164]
+    assert picture[3] == [0, 255, 255]
+
+
+def test_evaluation_is_immutable(evaluator) -> None:
+    evaluation = evaluator.evaluate(perfect)
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        evaluation.reference_hash = "other"

@@ -1,0 +1,96 @@
+import numpy as np
+import pytest
+import torch
+from skimage import color
+from skimage.metrics import structural_similarity
+
+from ngi.evaluate import dssim, mae, mape, non_finite_pixels, tone_map
+
+SIZES = [(11, 11), (13, 37), (64, 65)]
+
+
+def images(height: int, width: int) -> tuple[torch.Tensor, torch.Tensor]:
+    generator = torch.Generator().manual_seed(height * width)
+    x = torch.rand(height, width, 3, generator=generator)
+    return x, (x + 0.2 * torch.randn(x.shape, generator=generator)).clamp(0, 1)
+
+
+@pytest.mark.parametrize(("height", "width"), SIZES)
+def test_dssim_is_that_of_scikit_image(height: int, width: int) -> None:
+    x, y = images(height, width)
+    expected = structural_similarity(
+        x.double().numpy(),
+        y.double().numpy(),
+        data_range=1.0,
+        channel_axis=-1,
+        gaussian_weights=True,
+        sigma=1.5,
+        use_sample_covariance=False,
+    )
+    assert dssim(x, y) == pytest.approx((1 - expected) / 2, abs=1e-9)
+
+
+def test_dssim_of_another_window_is_that_of_a_loop() -> None:
+    x, y = (image.double().numpy() for image in images(9, 12))
+    offset = np.arange(-2, 3)
+    weight = np.exp(-(offset[:, None] ** 2 + offset[None, :] ** 2) / (2 * 0.8**2))
+    weight /= weight.sum()
+    values = []
+    for channel in range(3):
+        for i in range(9 - 4):
+            for j in range(12 - 4):
+                a, b = x[i : i + 5, j : j + 5, channel], y[i : i + 5, j : j + 5, channel]
+                ma, mb = (weight * a).sum(), (weight * b).sum()
+                va, vb = (weight * (a - ma) ** 2).sum(), (weight * (b - mb) ** 2).sum()
+                cov = (weight * (a - ma) * (b - mb)).sum()
+                luminance = (2 * ma * mb + 1e-4) / (ma**2 + mb**2 + 1e-4)
+                values.append(luminance * (2 * cov + 9e-4) / (va + vb + 9e-4))
+    result = dssim(torch.from_numpy(x), torch.from_numpy(y), window=5, sigma=0.8)
+    assert result == pytest.approx((1 - np.mean(values)) / 2, abs=1e-10)
+
+
+@pytest.mark.parametrize(("height", "width"), SIZES)
+def test_relative_and_absolute_error_are_those_of_numpy(height: int, width: int) -> None:
+    x, y = images(height, width)
+    difference = np.abs(x.double().numpy() - y.double().numpy())
+    assert mape(x, y, 0.01) == pytest.approx(
+        np.mean(difference / (y.double().numpy() + 0.01)), rel=1e-12
+    )
+    assert mae(x, y) == pytest.approx(np.mean(difference), rel=1e-12)
+
+
+def test_relative_error_of_a_black_reference_is_relative_to_epsilon() -> None:
+    black = torch.zeros(4, 4, 3)
+    assert mape(torch.full((4, 4, 3), 0.02), black, 0.01) == pytest.approx(2.0)
+
+
+def test_equal_images_have_no_error() -> None:
+    x, _ = images(16, 16)
+    assert (mape(x, x, 0.01), mae(x, x), dssim(x, x)) == (0.0, 0.0, pytest.approx(0.0, abs=1e-12))
+
+
+def test_tone_map_is_the_srgb_curve_of_scikit_image() -> None:
+    linear = torch.linspace(0, 1, 3000).reshape(-1, 3).double()
+    xyz = np.tensordot(linear.numpy(), color.rgb2xyz(np.eye(3)[None])[0], axes=1)
+    np.testing.assert_allclose(tone_map(linear).numpy(), color.xyz2rgb(xyz), atol=2e-4)
+
+
+def test_tone_map_exposes_in_stops_and_clips() -> None:
+    radiance = torch.tensor([[-1.0, 0.125, 3.0]])
+    assert torch.equal(tone_map(radiance, exposure=1.0), tone_map(torch.tensor([[0.0, 0.25, 1.0]])))
+
+
+@pytest.mark.parametrize("bad", [float("nan"), float("inf"), -float("inf")])
+def test_values_that_are_not_finite_are_not_hidden(bad: float) -> None:
+    x, y = images(16, 16)
+    x[3, 4, 1] = bad
+    assert non_finite_pixels(x) == 1
+    for value in (mape(x, y, 0.01), mae(x, y), dssim(tone_map(x), tone_map(y))):
+        assert not np.isfinite(value)
+
+
+def test_errors_name_the_shapes() -> None:
+    with pytest.raises(ValueError, match=r"\[4, 5, 3\].*\[5, 4, 3\]"):
+        mae(torch.zeros(4, 5, 3), torch.zeros(5, 4, 3))
+    with pytest.raises(ValueError, match="window of 11 pixels"):
+        dssim(torch.zeros(10, 20, 3), torch.zeros(10, 20, 3))

@@ -1,0 +1,45 @@
+"""Runs the program as a user does, on the analytic renderer and at a size that takes seconds."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+SMALL = [
+    "renderer=analytic",
+    "renderer.patch_size=16",
+    "resolution=constant",
+    "resolution.resolution=32",
+    "sampler.chains=4",
+    "model.hidden_features=16",
+    "model.hidden_layers=2",
+    "loss.window_size=7",
+    "reuse.policy.bootstrap_batches=5",
+    "reuse.policy.beta=1.0",
+    "optimizer.lr=1e-3",
+    "budget=steps",
+    "budget.steps=12",
+    "evaluation=smoke",
+]
+
+
+def environment(folder: Path) -> dict[str, str]:
+    return {**os.environ, "NGI_CACHE": str(folder / "cache"), "OMP_NUM_THREADS": "1"}
+
+
+def start(folder: Path, *overrides: str) -> "subprocess.Popen[str]":
+    return subprocess.Popen(
+        [sys.executable, "-m", "ngi.train", *SMALL, *overrides],
+        cwd=folder,
+        env=environment(folder),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+
+
+def run(folder: Path, *overrides: str) -> tuple[int, str]:
+    """Exit status and everything printed."""
+    process = start(folder, *overrides)
+    output, _ = process.communicate(timeout=300)
+    return process.returncode, output

@@ -1,0 +1,97 @@
+import shutil
+from pathlib import Path
+
+import pytest
+import torch
+
+from .command_line import run
+
+
+@pytest.mark.parametrize(
+    ("overrides", "words"),
+    [
+        (["budget.steps=0"], ["budget.steps", "0"]),
+        (["budget=seconds", "budget.steps=null", "budget.seconds=0"], ["budget"]),
+        (["sampler=surprise"], ["sampler/surprise", "mcmc_loss_step", "uniform"]),
+        (["scene=nowhere"], ["scene/nowhere", "sphere-caustic"]),
+        (["resolution.resolution=8"], ["resolution", "8", "16", "patch"]),
+        (["sampler.chains=0"], ["chains", "0"]),
+        (["evaluation.count=0"], ["evaluation.count"]),
+        (["model.hidden_layers=0"], ["hidden_layers"]),
+        (["tracker=wandb", "tracker.mode=maybe"], ["tracker.mode", "maybe"]),
+        (["evaluation.evaluator.lpips.weights=/nowhere.pth"], ["nowhere.pth"]),
+    ],
+)
+def test_each_error_names_its_key_and_value(
+    tmp_path: Path, overrides: list[str], words: list[str]
+) -> None:
+    status, output = run(tmp_path, *overrides, "run.folder=run")
+    assert status != 0
+    for word in words:
+        assert word in output
+    assert not (tmp_path / "run" / "result.json").exists()
+    assert not (tmp_path / "run" / "steps.csv").exists()
+
+
+@pytest.fixture(scope="module")
+def interrupted(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run with a checkpoint and without a result."""
+    folder = tmp_path_factory.mktemp("interrupted")
+    status, output = run(folder, "run.folder=run")
+    assert status == 0, output
+    (folder / "run" / "result.json").unlink()
+    return folder
+
+
+def copy(interrupted: Path, to: Path) -> Path:
+    shutil.copytree(interrupted / "run", to / "run")
+    return to / "run"
+
+
+def test_a_damaged_checkpoint_is_refused(tmp_path: Path, interrupted: Path) -> None:
+    folder = copy(interrupted, tmp_path)
+    whole = (folder / "last.ckpt").read_bytes()
+    (folder / "last.ckpt").write_bytes(whole[: len(whole) // 2])
+    metrics = (folder / "metrics.csv").read_bytes()
+    status, output = run(tmp_path, "run.folder=run")
+    assert status != 0
+    assert "last.ckpt is damaged" in output
+    assert (folder / "metrics.csv").read_bytes() == metrics
+
+
+def test_the_checkpoint_of_another_run_is_refused(tmp_path: Path, interrupted: Path) -> None:
+    folder = copy(interrupted, tmp_path)
+    (folder / "settings.json").unlink()
+    status, output = run(tmp_path, "run.folder=run", "seed=5")
+    assert status != 0
+    assert "last.ckpt belongs to run" in output
+
+
+def test_a_missing_patch_file_is_named(tmp_path: Path, interrupted: Path) -> None:
+    folder = copy(interrupted, tmp_path)
+    segment = next((folder / "patches").iterdir())
+    segment.unlink()
+    status, output = run(tmp_path, "run.folder=run")
+    assert status != 0
+    assert segment.name in output
+
+
+def test_the_folder_of_another_run_is_refused(tmp_path: Path, interrupted: Path) -> None:
+    folder = copy(interrupted, tmp_path)
+    checkpoint = (folder / "last.ckpt").read_bytes()
+    status, output = run(tmp_path, "run.folder=run", "optimizer.lr=0.5")
+    assert status != 0
+    assert "optimizer.lr: 0.001 there, 0.5 now" in output
+    assert (folder / "last.ckpt").read_bytes() == checkpoint
+
+
+def test_a_run_killed_before_its_result_only_evaluates(tmp_path: Path, interrupted: Path) -> None:
+    folder = copy(interrupted, tmp_path)
+    before = torch.load(folder / "last.ckpt", weights_only=True)
+    metrics = (folder / "metrics.csv").read_text().splitlines()
+    status, output = run(tmp_path, "run.folder=run")
+    assert status == 0, output
+    after = torch.load(folder / "last.ckpt", weights_only=True)
+    assert before["global_step"] == after["global_step"]
+    assert (folder / "result.json").exists()
+    assert len((folder / "metrics.csv").read_text().splitlines()) == len(metrics)

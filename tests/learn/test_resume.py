@@ -1,0 +1,102 @@
+import signal
+import time
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+import torch
+
+from ngi.learn.row_log import RowLog
+
+from .command_line import run, start
+
+COMMAND = ("budget.steps=60", "run.checkpoint_steps=7")
+
+
+def assert_same(a: Any, b: Any, path: str = "") -> None:
+    if isinstance(a, dict):
+        assert a.keys() == b.keys(), path
+        for key in a:
+            assert_same(a[key], b[key], f"{path}.{key}")
+    elif isinstance(a, list | tuple):
+        assert len(a) == len(b), path
+        for i, (x, y) in enumerate(zip(a, b, strict=True)):
+            assert_same(x, y, f"{path}[{i}]")
+    elif isinstance(a, torch.Tensor):
+        assert torch.equal(a, b), path
+    else:
+        assert a == b, path
+
+
+def final_state(folder: Path) -> dict[str, Any]:
+    checkpoint = torch.load(folder / "last.ckpt", weights_only=True)
+    parts = ("state_dict", "optimizer_states", "ExplorationDataModule", "global_step")
+    return {part: checkpoint[part] for part in parts}
+
+
+@pytest.fixture(scope="module")
+def unbroken(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("unbroken")
+    status, output = run(folder, *COMMAND, "run.folder=run")
+    assert status == 0, output
+    return folder / "run"
+
+
+def kill_after(folder: Path, file: str, delay: float) -> None:
+    process = start(folder, *COMMAND, "run.folder=run")
+    deadline = time.monotonic() + 120
+    while not (folder / "run" / file).exists():
+        assert process.poll() is None, process.communicate()[0]
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+    time.sleep(delay)
+    process.send_signal(signal.SIGKILL)
+    process.communicate()
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.12])
+def test_a_killed_run_ends_bit_for_bit_like_an_unbroken_one(
+    tmp_path: Path, unbroken: Path, delay: float
+) -> None:
+    kill_after(tmp_path, "last.ckpt", delay)
+    assert not (tmp_path / "run" / "result.json").exists(), "it was not killed in time"
+    status, output = run(tmp_path, *COMMAND, "run.folder=run")
+    assert status == 0, output
+    assert "going on from step" in output
+    assert_same(final_state(tmp_path / "run"), final_state(unbroken))
+    for name in sorted(p.name for p in (unbroken / "patches").iterdir()):
+        assert_same(
+            torch.load(tmp_path / "run" / "patches" / name, weights_only=True),
+            torch.load(unbroken / "patches" / name, weights_only=True),
+        )
+    ours, theirs = (
+        pd.read_csv(f / "steps.csv").drop(columns="run_seconds")
+        for f in (tmp_path / "run", unbroken)
+    )
+    pd.testing.assert_frame_equal(ours, theirs, check_exact=True)
+
+
+def test_a_finished_run_is_not_run_again(tmp_path: Path, unbroken: Path) -> None:
+    before = {p: p.stat().st_mtime_ns for p in unbroken.glob("*.*")}
+    status, output = run(tmp_path, *COMMAND, f"run.folder={unbroken}")
+    assert status == 0, output
+    assert "finished already" in output
+    after = {p: p.stat().st_mtime_ns for p in unbroken.glob("*.*")}
+    assert {p for p in before if before[p] != after[p]} <= {unbroken / "settings.json"}
+
+
+def test_another_seed_gives_another_run(tmp_path: Path, unbroken: Path) -> None:
+    status, output = run(tmp_path, *COMMAND, "run.folder=run", "seed=1")
+    assert status == 0, output
+    ours, theirs = final_state(tmp_path / "run"), final_state(unbroken)
+    key = next(iter(theirs["state_dict"]))
+    assert not torch.equal(ours["state_dict"][key], theirs["state_dict"][key])
+
+
+def test_the_log_has_one_row_per_step(unbroken: Path) -> None:
+    steps = pd.read_csv(unbroken / "steps.csv")
+    assert steps["step"].tolist() == list(range(1, 61))
+    for column in ("reuse_probability", "loss_new", "loss_existing", "store_size", "store_mean_age"):
+        assert column in steps.columns
+    assert RowLog(unbroken / "steps.csv") is not None

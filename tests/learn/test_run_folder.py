@@ -1,0 +1,54 @@
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ngi.learn.run_folder import RunFolder
+
+SETTINGS: dict[str, Any] = {"model": {"hidden_features": 64}, "seed": 0, "scene": {"hash": "abc"}}
+
+
+def test_same_settings_same_identity_in_any_order(tmp_path: Path) -> None:
+    first = RunFolder(tmp_path / "a", settings=SETTINGS)
+    second = RunFolder(tmp_path / "b", settings=dict(reversed(SETTINGS.items())))
+    other = RunFolder(tmp_path / "c", settings={**SETTINGS, "seed": 1})
+    assert first.identity == second.identity != other.identity
+    for folder in (first, second, other):
+        folder.close()
+
+
+def test_another_run_is_refused_and_nothing_is_touched(tmp_path: Path) -> None:
+    first = RunFolder(tmp_path, settings=SETTINGS)
+    first.write_result({"finished": True})
+    first.close()
+    before = {p.name: p.read_bytes() for p in tmp_path.iterdir()}
+    changed = {**SETTINGS, "model": {"hidden_features": 128}}
+    with pytest.raises(ValueError, match=r"model\.hidden_features: 64 there, 128 now"):
+        RunFolder(tmp_path, settings=changed)
+    assert {p.name: p.read_bytes() for p in tmp_path.iterdir()} == before
+    again = RunFolder(tmp_path, settings=SETTINGS)  # the refusal holds no lock
+    assert again.result == {"finished": True}
+    again.close()
+
+
+def test_two_processes_can_not_train_one_run(tmp_path: Path) -> None:
+    first = RunFolder(tmp_path, settings=SETTINGS)
+    with pytest.raises(RuntimeError, match="another process"):
+        RunFolder(tmp_path, settings=SETTINGS)
+    first.close()
+
+
+def test_damaged_result_is_named(tmp_path: Path) -> None:
+    folder = RunFolder(tmp_path, settings=SETTINGS)
+    folder.write_result({"finished": True})
+    (tmp_path / "result.json").write_text(json.dumps({"finished": True})[:-3])
+    with pytest.raises(ValueError, match=r"result\.json is damaged"):
+        _ = folder.result
+    folder.close()
+
+
+def test_unfinished_run_has_no_result(tmp_path: Path) -> None:
+    folder = RunFolder(tmp_path, settings=SETTINGS)
+    assert folder.result is None
+    folder.close()

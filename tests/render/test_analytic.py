@@ -1,0 +1,81 @@
+import pytest
+import torch
+
+from ngi.patches import BufferLayout
+from ngi.render import AnalyticRenderer
+
+
+def make(**arguments):
+    return AnalyticRenderer(**{"dimensions": 3, "patch_size": 8, **arguments})
+
+
+def states(n, dimensions=3, seed=0):
+    return torch.rand(n, dimensions + 2, generator=torch.Generator().manual_seed(seed))
+
+
+def test_patch_equals_the_same_pixels_of_the_image() -> None:
+    renderer = make()
+    state = states(1)
+    patch = renderer.render_patches(state, resolution=20, seed=0)
+    image = renderer.render_image(state[0, :3], resolution=20, samples_per_pixel=1, seed=0)
+    x, y = (int(p * 13) for p in state[0, 3:])
+    torch.testing.assert_close(patch.buffers[0], image.buffers[y : y + 8, x : x + 8])
+    torch.testing.assert_close(
+        patch.log_radiance[0].expm1(), image.radiance[y : y + 8, x : x + 8]
+    )
+
+
+@pytest.mark.parametrize("dimensions", [1, 2, 7, 128])
+def test_radiance_depends_on_every_component_of_v(dimensions) -> None:
+    renderer = make(dimensions=dimensions)
+    v = torch.full((dimensions,), 0.5, dtype=torch.float32)
+    image = renderer.render_image(v, resolution=8, samples_per_pixel=1, seed=0).radiance
+    for i in range(dimensions):
+        moved = v.clone()
+        moved[i] = 0.8
+        other = renderer.render_image(moved, resolution=8, samples_per_pixel=1, seed=0).radiance
+        assert (image - other).abs().max() > 1e-2
+
+
+def test_lamp_shows_in_radiance_and_emission_alike() -> None:
+    image = make().render_image(torch.rand(3), resolution=64, samples_per_pixel=1, seed=0)
+    without = make(layout=BufferLayout(("position", "roughness")))
+    dark = without.render_image(torch.rand(3), resolution=64, samples_per_pixel=1, seed=0)
+    assert dark.buffers.shape == (64, 64, 4)
+    emission = image.buffers[..., BufferLayout().slice("emission")].expm1()
+    lit = emission[..., 0] > 0
+    assert abs(lit.float().mean() - torch.pi * 0.08**2) < 2e-3
+    torch.testing.assert_close(emission[lit], torch.full_like(emission[lit], 3))
+    assert (image.radiance[lit] > 3).all()
+
+
+def test_noise_is_seeded_per_state_and_falls_with_the_samples() -> None:
+    clean = make().render_patches(states(4), resolution=16, seed=0).log_radiance.expm1()
+    noisy = make(noise=0.2, samples_per_pixel=4)
+    a = noisy.render_patches(states(4), resolution=16, seed=0).log_radiance
+    assert torch.equal(a, noisy.render_patches(states(4), resolution=16, seed=0).log_radiance)
+    assert torch.equal(a[1:2], noisy.render_patches(states(4)[1:2], resolution=16, seed=0).log_radiance)
+    assert not torch.equal(a, noisy.render_patches(states(4), resolution=16, seed=1).log_radiance)
+    error = (a.expm1() / clean - 1).std()
+    torch.testing.assert_close(error, torch.tensor(0.1), atol=0.01, rtol=0)
+
+
+def test_hard_frames_and_hash() -> None:
+    frames = make(dimensions=5).hard_frames()
+    assert frames.shape == (10, 5)
+    assert ((frames >= 0) & (frames <= 1)).all()
+    assert len(frames.unique(dim=0)) == 10
+    assert make().scene_hash == make(patch_size=4).scene_hash != make(dimensions=4).scene_hash
+
+
+@pytest.mark.parametrize("bad", [{"dimensions": 0}, {"patch_size": 0}, {"noise": -1.0}])
+def test_bad_construction(bad) -> None:
+    with pytest.raises(ValueError, match=next(iter(bad))):
+        make(**bad)
+
+
+def test_bad_states() -> None:
+    with pytest.raises(ValueError, match="expected \\[n, 5\\]"):
+        make().render_patches(torch.rand(2, 4), resolution=16, seed=0)
+    with pytest.raises(ValueError, match="larger than the image"):
+        make().render_patches(torch.rand(2, 5), resolution=7, seed=0)

@@ -1,0 +1,226 @@
+"""Radiance against `mi.render`, and what every renderer promises of its patches."""
+
+import shutil
+
+import numpy as np
+import pytest
+import torch
+
+from ngi.backend import dr, mi
+from ngi.render.mitsuba_renderer import MitsubaRenderer
+from ngi.scene import read_scene
+from ngi.scene.variable_scene import VariableScene
+
+V = torch.tensor([0.2, 0.9, 0.4, 0.8, 0.4, 0.3, 0.3, 0.6, 0.25, 0.6])
+
+
+def states(n, seed=0):
+    return torch.rand(n, 12, generator=torch.Generator().manual_seed(seed))
+
+
+def z_scores(a, b):
+    """Welch's statistic, where there is noise, of independent renderings along the first axis."""
+    variance = a.var(0, ddof=1) / len(a) + b.var(0, ddof=1) / len(b)
+    noisy = variance > 1e-12
+    assert noisy.mean() > 0.4
+    np.testing.assert_allclose(a.mean(0)[~noisy], b.mean(0)[~noisy], rtol=1e-5)
+    return (a.mean(0) - b.mean(0))[noisy] / np.sqrt(variance[noisy])
+
+
+def images(renderer, count, seed=0):
+    return np.stack(
+        [
+            renderer.render_image(V, resolution=32, samples_per_pixel=32, seed=seed + i).radiance
+            for i in range(count)
+        ]
+    )
+
+
+@pytest.fixture(scope="module", params=["llvm", "scalar"])
+def renderer(request, load_box):
+    return load_box(request.param, buffer_samples=1, patch_size=16)
+
+
+def test_radiance_agrees_with_mitsubas_own_renderer(renderer, box_folder) -> None:
+    ours = images(renderer, 12)
+    scene = VariableScene(read_scene(box_folder))
+    scene.apply(V)
+    theirs = np.stack([np.array(mi.render(scene.scene, spp=32, seed=i)) for i in range(12)])
+    z = z_scores(ours, theirs)
+    assert abs(ours.mean() / theirs.mean() - 1) < 0.01
+    assert 0.8 < np.mean(z**2) < 1.3  # 22 / 20 for Student's t of 22 degrees of freedom
+    assert np.mean(abs(z) > 4) < 2e-3
+
+
+def test_scalar_and_llvm_agree(load_box) -> None:
+    a, b = (load_box(name, buffer_samples=1, patch_size=16) for name in ("llvm", "scalar"))
+    z = z_scores(images(a, 12), images(b, 12))
+    assert 0.8 < np.mean(z**2) < 1.3
+    buffers = [
+        r.render_image(V, resolution=32, samples_per_pixel=1, seed=0).buffers for r in (a, b)
+    ]
+    different = ((buffers[0] - buffers[1]).abs() > 1e-3).any(-1)
+    assert different.float().mean() < 0.01  # rays that meet an edge
+
+
+def test_patch_is_a_crop_of_the_image(renderer) -> None:
+    position = torch.tensor([[0.37, 0.81]])
+    x, y = 12, 26  # floor(0.37 * 33), floor(0.81 * 33)
+    state = torch.cat([V[None], position], 1)
+    patches = [renderer.render_patches(state, resolution=48, seed=i) for i in range(16)]
+    image = renderer.render_image(V, resolution=48, samples_per_pixel=256, seed=0)
+    torch.testing.assert_close(
+        patches[0].buffers[0], image.buffers[y : y + 16, x : x + 16], atol=1e-5, rtol=0
+    )
+    radiance = torch.stack([p.log_radiance[0].expm1() for p in patches]).mean(0)
+    crop = image.radiance[y : y + 16, x : x + 16]
+    assert abs(radiance.mean() / crop.mean() - 1) < 0.03
+    correlation = torch.corrcoef(torch.stack([radiance.flatten(), crop.flatten()]))[0, 1]
+    assert correlation > 0.95
+
+
+def test_equal_seeds_give_equal_bits_and_others_do_not(renderer) -> None:
+    a, b, c = (renderer.render_patches(states(3), resolution=40, seed=s) for s in (5, 5, 6))
+    assert torch.equal(a.log_radiance, b.log_radiance)
+    assert torch.equal(a.buffers, b.buffers)
+    assert not torch.equal(a.log_radiance, c.log_radiance)
+    assert torch.equal(a.buffers, c.buffers)
+
+
+def test_a_patch_does_not_depend_on_the_rest_of_its_batch(renderer) -> None:
+    batch = renderer.render_patches(states(4), resolution=40, seed=1)
+    order = [2, 0]
+    part = renderer.render_patches(states(4)[order], resolution=40, seed=1)
+    assert torch.equal(part.log_radiance, batch.log_radiance[order])
+    assert torch.equal(part.buffers, batch.buffers[order])
+
+
+def test_results_are_not_changed_by_later_work(renderer) -> None:
+    first = renderer.render_patches(states(2), resolution=40, seed=1)
+    copy = first.log_radiance.clone(), first.buffers.clone()
+    renderer.render_patches(states(2, seed=9), resolution=40, seed=2)
+    assert torch.equal(first.log_radiance, copy[0])
+    assert torch.equal(first.buffers, copy[1])
+
+
+def test_counts_shapes_and_an_empty_batch(renderer) -> None:
+    patches = renderer.render_patches(states(2), resolution=16, seed=0)
+    assert patches.buffers.shape == (2, 16, 16, renderer.layout.channels)
+    assert patches.log_radiance.shape == (2, 16, 16, 3)
+    assert (patches.repaired, patches.masked, patches.paths) == (0, 0, 2 * 16 * 16 * 8)
+    assert len(renderer.render_patches(states(0), resolution=16, seed=0).buffers) == 0
+
+
+def test_nothing_is_compiled_after_warm_up(load_box) -> None:
+    renderer = load_box("llvm", patch_size=16)
+    renderer.render_patches(states(2), resolution=32, seed=0)
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        dr.kernel_history_clear()
+        for i in range(25):
+            renderer.render_patches(states(4, seed=i), resolution=32 + 17 * i, seed=i)
+        kernels = dr.kernel_history([dr.KernelType.JIT])
+    assert len(kernels) >= 200
+    assert all(kernel["cache_hit"] for kernel in kernels)
+
+
+def test_image_is_the_mean_of_its_passes(load_box, monkeypatch) -> None:
+    renderer = load_box("llvm", buffer_samples=1, patch_size=16)
+    whole = renderer.render_image(V, resolution=16, samples_per_pixel=512, seed=0)
+    monkeypatch.setattr("ngi.render.mitsuba_renderer.SAMPLES_PER_PASS", 100)
+    monkeypatch.setattr("ngi.render.mitsuba_renderer.PATHS_PER_LAUNCH", 100 * 16 * 5)
+    passes = renderer.render_image(V, resolution=16, samples_per_pixel=512, seed=0)
+    torch.testing.assert_close(passes.buffers, whole.buffers)
+    assert passes.radiance.shape == (16, 16, 3)
+    # Away from the lamp, whose edges are the noisiest part of the picture.
+    dark = (whole.buffers[..., renderer.layout.slice("emission")] == 0).all(-1)
+    dark &= whole.radiance.amax(-1) < 1
+    a, b = passes.radiance[dark].mean(), whole.radiance[dark].mean()
+    torch.testing.assert_close(a, b, rtol=0.01, atol=0)
+
+
+@pytest.mark.parametrize(("bad_attempts", "masked"), [(1, 0), (2, 1)])
+def test_pixels_that_are_not_finite(load_box, monkeypatch, bad_attempts, masked) -> None:
+    renderer = load_box("llvm", buffer_samples=1, patch_size=16)
+    radiance = renderer._patch_tracer.radiance
+    calls = []
+
+    def broken(window, **arguments):
+        calls.append(arguments["seed"])
+        image = radiance(window, **arguments)().copy()
+        if len(calls) <= bad_attempts:
+            image[3, 4, 1] = np.nan
+        return lambda: image
+
+    monkeypatch.setattr(renderer._patch_tracer, "radiance", broken)
+    patches = renderer.render_patches(states(1), resolution=40, seed=0)
+    assert (patches.repaired, patches.masked) == (1, masked)
+    assert patches.paths == 2 * 16 * 16 * 8
+    assert len(set(calls)) == 2
+    assert torch.isfinite(patches.log_radiance).all()
+    assert bool((patches.log_radiance[0, 3, 4] == 0).all()) == bool(masked)
+
+
+@pytest.mark.parametrize("backend", ["llvm", "scalar"])
+def test_furnace(tmp_path, backend, load_box) -> None:
+    """A white sphere under a constant sky of radiance 1 is invisible."""
+    load_box(backend)  # skips where the backend is missing
+    (tmp_path / "scene.xml").write_text(
+        """<scene version="3.0.0">
+        <integrator type="path"><integer name="max_depth" value="4"/></integrator>
+        <sensor type="perspective"><float name="fov" value="40"/>
+          <transform name="to_world"><lookat origin="0,0,4" target="0,0,0" up="0,1,0"/></transform>
+          <film type="hdrfilm"><integer name="width" value="8"/>
+            <integer name="height" value="8"/></film></sensor>
+        <shape type="sphere" id="ball"><bsdf type="diffuse" id="white">
+          <rgb name="reflectance" value="0.5"/></bsdf></shape>
+        <emitter type="constant"><rgb name="radiance" value="1"/></emitter></scene>"""
+    )
+    (tmp_path / "scene.yaml").write_text(
+        "{name: furnace, scene: scene.xml, samples_per_pixel: 1, max_depth: 4,\n"
+        "bounds: {minimum: [-1, -1, -1], maximum: [1, 1, 1]},\n"
+        "variables: [{object: white, property: albedo, minimum: [0, 0, 0], maximum: [1, 1, 1]}],\n"
+        "camera_path: [[0, 0, 0]], hard_frames: [[1, 1, 1]]}"
+    )
+    furnace = MitsubaRenderer(scene=tmp_path, backend=backend, patch_size=4, buffer_samples=64)
+    assert furnace.layout.names == ("position", "normal", "outgoing", "albedo", "emission")
+    image = furnace.render_image(torch.ones(3), resolution=16, samples_per_pixel=256, seed=0)
+    sky = (image.buffers[..., furnace.layout.slice("albedo")] == 0).all(-1)
+    ball = (image.buffers[..., furnace.layout.slice("albedo")] == 1).all(-1)
+    assert sky.any()
+    sky_radiance = image.radiance[sky]
+    torch.testing.assert_close(sky_radiance, torch.ones_like(sky_radiance), atol=0.01, rtol=0)
+    emission = image.buffers[..., furnace.layout.slice("emission")]
+    torch.testing.assert_close(emission[sky], torch.ones(int(sky.sum()), 3).log1p())
+    assert (emission[ball] == 0).all()
+    assert abs(image.radiance[ball].mean() - 1) < 0.01
+    ball_radiance = image.radiance[ball]
+    torch.testing.assert_close(ball_radiance, torch.ones_like(ball_radiance), atol=0.2, rtol=0)
+
+
+@pytest.mark.parametrize(
+    ("bad", "resolution", "message"),
+    [
+        (torch.rand(2, 11), 40, r"shape \[2, 11\]: expected \[n, 12\]"),
+        (torch.full((1, 12), 1.5), 40, r"states\[0, 0\] is 1.5; expected 0 to 1"),
+        (torch.full((1, 12), torch.nan), 40, r"states\[0, 0\] is nan"),
+        (torch.rand(1, 12), 15, "patch of 16 pixels is larger than the image of 15"),
+    ],
+)
+def test_bad_states(renderer, bad, resolution, message) -> None:
+    with pytest.raises(ValueError, match=message):
+        renderer.render_patches(bad, resolution=resolution, seed=0)
+
+
+def test_bad_construction(box_folder, tmp_path) -> None:
+    with pytest.raises(ValueError, match="patch_size is 0"):
+        MitsubaRenderer(scene=box_folder, backend="scalar", patch_size=0)
+    with pytest.raises(ValueError, match="backend 'metal': choose one of"):
+        MitsubaRenderer(scene=box_folder, backend="metal")
+    shutil.copytree(box_folder, tmp_path, dirs_exist_ok=True)
+    xml = (tmp_path / "scene.xml").read_text()
+    (tmp_path / "scene.xml").write_text(xml.replace('name="width" value="32"', 'name="width" value="33"'))
+    with pytest.raises(ValueError, match="film is 33 x 32; make width and height equal"):
+        MitsubaRenderer(scene=tmp_path, backend="scalar")
+    (tmp_path / "scene.xml").write_text(xml.replace('type="roughplastic"', 'type="pplastic"'))
+    with pytest.raises(ValueError, match="BSDF 'clay' is of kind"):
+        MitsubaRenderer(scene=tmp_path, backend="scalar")

@@ -1,0 +1,146 @@
+import io
+
+import pytest
+import torch
+from scipy.special import expit
+
+from ngi.reuse import FixedProbability, Never, PolicyState, SelfTuning, UntilFull
+
+PAPER = {"bootstrap_batches": 100, "beta": 4.6, "ema_coefficient": 0.9}
+LATER = {"generated_batches": 100, "store_size": 1600, "store_capacity": 100_000}
+
+
+def update(policy, state, reused, losses, large_step=None):
+    losses = torch.tensor(losses)
+    if large_step is None:
+        large_step = torch.ones(len(losses), dtype=torch.bool)
+    return policy.update(
+        state, reused=reused, losses=losses, large_step=torch.as_tensor(large_step)
+    )
+
+
+def test_equal_losses_give_the_paper_s_probability() -> None:
+    state = PolicyState(existing_loss=0.3, new_loss=0.3)
+    assert SelfTuning(**PAPER).probability(state, **LATER) == pytest.approx(0.99, abs=1e-4)
+
+
+@pytest.mark.parametrize("beta", [-2000.0, -5.0, 0.0, 2.0, 4.6, 2000.0])
+@pytest.mark.parametrize(("existing", "new"), [(0.0, 0.0), (0.1, 0.9), (0.9, 0.1), (0.0, 1e4)])
+def test_probability_is_the_sigmoid_of_the_difference(beta, existing, new) -> None:
+    policy = SelfTuning(bootstrap_batches=0, beta=beta, ema_coefficient=0.9)
+    state = PolicyState(existing_loss=existing, new_loss=new)
+    expected = float(expit(existing - new + beta))
+    assert policy.probability(state, **LATER) == pytest.approx(expected, rel=1e-12, abs=1e-300)
+
+
+def test_averages_start_at_the_loss_at_the_end_of_the_bootstrap() -> None:
+    policy = SelfTuning(**PAPER | {"bootstrap_batches": 3})
+    state = policy.init()
+    for loss in (9.0, 5.0, 2.0):
+        state = update(policy, state, False, [loss])
+    assert (state.existing_loss, state.new_loss) == (2.0, 2.0)
+    state = update(policy, state, False, [1.0])
+    assert (state.existing_loss, state.new_loss) == (2.0, pytest.approx(1.9))
+    state = update(policy, state, True, [3.0])
+    assert (state.existing_loss, state.new_loss) == (pytest.approx(2.1), pytest.approx(1.9))
+    assert state.generated_batches == 4
+
+
+@pytest.mark.parametrize("reused", [False, True])
+def test_averages_follow_the_closed_form(reused) -> None:
+    policy = SelfTuning(**PAPER | {"bootstrap_batches": 1})
+    state = update(policy, policy.init(), False, [4.0])
+    losses = [0.5, 3.0, 1.0, 0.0, 7.0]
+    for loss in losses:
+        state = update(policy, state, reused, [loss - 0.25, loss + 0.25])
+    # c^n x_0 + (1 - c) sum_i c^(n - i) x_i
+    expected = 0.9**5 * 4 + 0.1 * sum(0.9 ** (4 - i) * x for i, x in enumerate(losses))
+    moved, kept = state.new_loss, state.existing_loss
+    if reused:
+        moved, kept = kept, moved
+    assert moved == pytest.approx(expected)
+    assert kept == 4
+
+
+def test_only_finite_losses_of_large_steps_count() -> None:
+    policy = SelfTuning(**PAPER | {"bootstrap_batches": 1})
+    state = update(policy, policy.init(), False, [4.0])
+    nan, inf = float("nan"), float("inf")
+    mixed = update(policy, state, True, [1.0, 8.0, nan, inf, 3.0], [True, False, True, True, True])
+    assert mixed.existing_loss == pytest.approx(0.9 * 4 + 0.1 * 2)
+    for losses, large in [([8.0, 9.0], [False, False]), ([nan, 9.0], [True, False]), ([], [])]:
+        large = torch.tensor(large, dtype=torch.bool)
+        assert update(policy, state, True, losses, large) == state
+
+
+@pytest.mark.parametrize(
+    "policy", [SelfTuning(**PAPER), FixedProbability(bootstrap_batches=100, probability=0.7)]
+)
+def test_the_bootstrap_generates_only(policy) -> None:
+    state = PolicyState(existing_loss=0.3, new_loss=0.3)
+    probability = [
+        policy.probability(state, generated_batches=n, store_size=16 * n, store_capacity=10**5)
+        for n in (0, 1, 99, 100, 101)
+    ]
+    assert probability[:3] == [0, 0, 0]
+    assert probability[3] == probability[4] >= 0.7
+
+
+def test_a_bootstrap_without_a_finite_loss_goes_on() -> None:
+    policy = SelfTuning(**PAPER | {"bootstrap_batches": 1})
+    state = update(policy, policy.init(), False, [float("nan")])
+    assert policy.probability(state, **LATER) == 0
+    state = update(policy, state, False, [2.0])
+    assert (state.existing_loss, state.new_loss) == (2.0, 2.0)
+    assert policy.probability(state, **LATER) > 0.98
+
+
+@pytest.mark.parametrize(
+    ("policy", "expected"),
+    [
+        (Never(), [0, 0, 0]),
+        (UntilFull(), [0, 0, 1]),
+        (FixedProbability(bootstrap_batches=0, probability=0.25), [0, 0.25, 0.25]),
+        (SelfTuning(bootstrap_batches=0, beta=0, ema_coefficient=0.9), [0, 0.5, 0.5]),
+    ],
+    ids=lambda part: type(part).__name__,
+)
+def test_every_policy_keeps_the_protocol(policy, expected) -> None:
+    state = policy.init()
+    assert policy.probability(state, generated_batches=0, store_size=0, store_capacity=64) == 0
+    state = update(policy, state, False, [1.0])
+    state = update(policy, state, True, [1.0])
+    assert state.generated_batches == 1
+    sizes = [
+        policy.probability(state, generated_batches=4, store_size=size, store_capacity=64)
+        for size in (0, 63, 64)
+    ]
+    assert sizes == expected
+
+    file = io.BytesIO()
+    torch.save(state.state_dict(), file)
+    file.seek(0)
+    assert PolicyState.from_state_dict(torch.load(file, weights_only=True)) == state
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("bootstrap_batches", -1),
+        ("beta", float("nan")),
+        ("ema_coefficient", 1.0),
+        ("ema_coefficient", -0.1),
+    ],
+)
+def test_self_tuning_rejects_bad_constants(key, value) -> None:
+    with pytest.raises(ValueError, match=f"{key}: {value}"):
+        SelfTuning(**PAPER | {key: value})
+
+
+def test_other_bad_input_is_named() -> None:
+    with pytest.raises(ValueError, match=r"probability: 1\.5"):
+        FixedProbability(bootstrap_batches=0, probability=1.5)
+    with pytest.raises(ValueError, match="bootstrap_batches: -1"):
+        FixedProbability(bootstrap_batches=-1, probability=0.5)
+    with pytest.raises(ValueError, match="large_step: shape"):
+        update(SelfTuning(**PAPER), PolicyState(), True, [1.0, 2.0], [True])

@@ -1,0 +1,156 @@
+"""Reading scene folders: what is right, and one clear error for everything that is wrong."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ngi.scene import Variable, read_scene, scene_vector_of, variable_values
+
+BOX = Path(__file__).parents[1] / "render" / "scenes" / "box"
+SCENES = sorted(p.parent for p in (Path(__file__).parents[2] / "scenes").glob("*/scene.yaml"))
+
+VARIABLES = (
+    Variable("wall", "albedo", (0.0, 0.1, 0.2), (1.0, 0.9, 0.8)),
+    Variable("ball", "translation", (-2.0, 1.0), (3.0, 1.5), axes="xz"),
+    Variable("glass", "roughness", (0.01,), (0.5,)),
+)
+
+
+@pytest.fixture
+def box(tmp_path):
+    return Path(shutil.copytree(BOX, tmp_path / "box"))
+
+
+def edit(folder, old, new, file="scene.yaml"):
+    text = (folder / file).read_text()
+    assert old in text
+    (folder / file).write_text(text.replace(old, new, 1))
+
+
+def test_box() -> None:
+    scene = read_scene(BOX)
+    assert scene.name == "box"
+    assert (scene.samples_per_pixel, scene.max_depth, scene.dimensions) == (8, 4, 10)
+    assert scene.component_names[2:8] == (
+        "left_wall.albedo.b",
+        "ball.translation.x",
+        "ball.translation.y",
+        "ball.translation.z",
+        "figure.translation.x",
+        "figure.translation.z",
+    )
+    assert scene.component_names[8:] == ("metal.roughness", "lamp.intensity")
+    assert scene.bounds_maximum == (1.0, 2.0, 1.0)
+
+
+@pytest.mark.parametrize("folder", SCENES, ids=lambda folder: folder.name)
+def test_shipped_scenes_are_right(folder) -> None:
+    scene = read_scene(folder)
+    assert scene.name == folder.name
+    assert len(scene.hard_frames) == 10
+
+
+@given(st.lists(st.floats(0, 1), min_size=6, max_size=6))
+def test_values_and_scene_vector_are_inverse(v) -> None:
+    values = variable_values(VARIABLES, v)
+    np.testing.assert_allclose(scene_vector_of(VARIABLES, values), v, atol=1e-12)
+
+
+def test_ends_of_the_range() -> None:
+    low, high = variable_values(VARIABLES, np.zeros(6)), variable_values(VARIABLES, np.ones(6))
+    for variable, a, b in zip(VARIABLES, low, high, strict=True):
+        np.testing.assert_allclose(a, variable.minimum)
+        np.testing.assert_allclose(b, variable.maximum)
+
+
+@pytest.mark.parametrize("bad", [[0.5] * 5, [[0.5] * 6], [0.5] * 5 + [1.01], [np.nan] + [0.5] * 5])
+def test_bad_scene_vector(bad) -> None:
+    with pytest.raises(ValueError, match="scene vector"):
+        variable_values(VARIABLES, bad)
+
+
+def test_hash_follows_contents_not_place(box, tmp_path) -> None:
+    moved = shutil.copytree(box, tmp_path / "elsewhere")
+    assert read_scene(moved).scene_hash == read_scene(box).scene_hash == read_scene(BOX).scene_hash
+    edit(box, 'value="0.2"/>\n        </bsdf>', 'value="0.21"/>\n        </bsdf>', "scene.xml")
+    assert read_scene(box).scene_hash != read_scene(moved).scene_hash
+
+
+def test_hash_follows_named_files(box) -> None:
+    edit(box, '<shape type="rectangle" id="back">',
+         '<default name="mesh" value="a.ply"/>\n<shape type="ply"><string name="filename" '
+         'value="$mesh"/></shape>\n<shape type="rectangle" id="back">', "scene.xml")  # fmt: skip
+    with pytest.raises(FileNotFoundError, match=r"scene.xml: <shape> names 'a.ply'"):
+        read_scene(box)
+    (box / "a.ply").write_bytes(b"1")
+    first = read_scene(box).scene_hash
+    (box / "a.ply").write_bytes(b"2")
+    assert read_scene(box).scene_hash != first
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("name: box", "name: [box", r"scene.yaml, line \d+: broken YAML"),
+        ("name: box", "nam: box", "name is missing; add it"),
+        ("name: box", "name: box\nmax_deth: 3", "unknown key 'max_deth'; did you mean 'max_depth'"),
+        ("max_depth: 4", "max_depth: 5", "max_depth is 5, but 4 in the integrator of"),
+        ("max_depth: 4", "max_depth: 0", "max_depth is 0; expected a positive integer"),
+        ("samples_per_pixel: 8", "samples_per_pixel: yes", "samples_per_pixel is True; expected int"),
+        ("scene: scene.xml", "scene: scen.xml", "scen.xml: no such scene file"),
+        ("maximum: [1, 2, 1]", "maximum: [1, 0, 1]", r"bounds.maximum is \[1.0, 0.0, 1.0\]"),
+        ("property: albedo", "property: albdo", "property is 'albdo'; choose one of .*'albedo'"),
+        ("axes: xz", "axes: zx", r"variables\[2\].axes 'zx': name one to three"),
+        ("axes: xz, ", "", r"variables\[2\].axes None: name one to three"),
+        ("property: roughness,", "property: roughness, axes: x,", "takes no axes"),
+        ("minimum: 0.1, maximum: 0.5", "minimum: 0.5, maximum: 0.1", r"variables\[3\].maximum is \[0.1\]"),
+        ("minimum: 0.1, maximum: 0.5", "minimum: 0.5, maximum: 0.5", "must be above minimum"),
+        ("minimum: 0.1, maximum: 0.5", "minimum: 0, maximum: 0.5", "roughness lies between 0.001"),
+        ("minimum: 0.5, maximum: 2", "minimum: [0, 1], maximum: 2", r"variables\[4\].minimum is \[0, 1\]; expected 1"),
+        ("minimum: 0.5, maximum: 2", "minimum: 0.5, maximum: .nan", r"variables\[4\].maximum is nan"),
+        ("object: lamp", "objct: lamp", r"variables\[4\].object is missing"),
+        ("object: lamp", "far: 1, object: lamp", r"unknown key 'variables\[4\].far'"),
+        ("object: lamp, property: intensity, minimum: 0.5, maximum: 2", "object: metal, property: roughness, minimum: 0.5, maximum: 0.6", "metal.roughness'; it is there twice"),
+        ("- [1, 0, 0, 0.2,", "- [2, 0, 0, 0.2,", r"hard_frames\[1\] is \[2.0, .* between 0 and 1"),
+        ("- [1, 0, 0, 0.2,", "- [0, 0, 0.2,", r"hard_frames\[1\] is .*expected 10 finite"),
+        ("- [1, 1, 1, 1, 1,", "- [1, 1, 1, 1, -1,", r"camera_path\[1\] is"),
+    ],
+)  # fmt: skip
+def test_bad_yaml(box, old, new, message) -> None:
+    edit(box, old, new)
+    with pytest.raises((ValueError, FileNotFoundError), match=message) as error:
+        read_scene(box)
+    assert str(box) in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("</scene>", "", "scene.xml: not well-formed XML"),
+        ('<integrator type="path">', '<integrator type="path"><boolean name="hide_emitters" value="true"/>', "hide_emitters is true"),
+        ("integrator", "x", "not well-formed XML"),
+    ],
+)  # fmt: skip
+def test_bad_xml(box, old, new, message) -> None:
+    edit(box, old, new, "scene.xml")
+    with pytest.raises(ValueError, match=message):
+        read_scene(box)
+
+
+def test_no_folder(tmp_path) -> None:
+    with pytest.raises(FileNotFoundError, match=r"nowhere.scene.yaml: no such file"):
+        read_scene(tmp_path / "nowhere")
+
+
+def test_mitsuba_is_not_imported() -> None:
+    program = (
+        "import sys, ngi.scene, ngi.render; ngi.scene.read_scene(sys.argv[1]);"
+        "sys.exit('mitsuba' in sys.modules or 'drjit' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", program, str(BOX)]).returncode == 0

@@ -1,0 +1,170 @@
+"""What only the shipped folders can get wrong: assets, clearances, what the mirror shows."""
+
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from PIL import Image
+from skimage.measure import points_in_poly
+
+SCENES = Path(__file__).parents[2] / "scenes"
+NAMES = ("sphere-caustic", "mirror")
+CLEARANCE = 0.005
+
+
+def read_ply(path):
+    header, body = path.read_bytes().split(b"end_header\n", 1)
+    lines = header.decode().splitlines()
+    vertices, faces = (int(line.split()[2]) for line in lines if line.startswith("element"))
+    properties = [line for line in lines if line.startswith("property float")]
+    split = vertices * len(properties) * 4
+    table = np.frombuffer(body[:split], "<f4").reshape(vertices, -1)
+    triangles = np.frombuffer(body[split:], [("count", "u1"), ("index", "<i4", 3)])
+    assert len(triangles) == faces
+    return table, triangles["index"]
+
+
+def scene_files(name):
+    root = ElementTree.parse(SCENES / name / "scene.xml").getroot()
+    return root, yaml.safe_load((SCENES / name / "scene.yaml").read_text())
+
+
+def shape_translation(root, identifier):
+    translate = root.find(f".//shape[@id='{identifier}']/transform/translate")
+    return np.array([float(translate.get(axis, 0)) for axis in "xyz"])
+
+
+def travel(specification, identifier):
+    """Least and greatest offset of a moving object, [2, 3]."""
+    variable = next(
+        v
+        for v in specification["variables"]
+        if v["object"] == identifier and v["property"] == "translation"
+    )
+    offsets = np.zeros((2, 3))
+    for k, axis in enumerate(variable["axes"]):
+        offsets[:, "xyz".index(axis)] = variable["minimum"][k], variable["maximum"][k]
+    return offsets
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_assets_are_what_their_script_makes(name, tmp_path) -> None:
+    subprocess.run(
+        [sys.executable, SCENES / name / "make.py", "--folder", tmp_path], check=True, timeout=120
+    )
+    shipped = {p.name for p in (SCENES / name).iterdir() if p.suffix in (".ply", ".jpg")}
+    assert shipped == {p.name for p in tmp_path.iterdir()}
+    for file in sorted(shipped):
+        if file.endswith(".ply"):
+            for ours, theirs in zip(
+                read_ply(tmp_path / file), read_ply(SCENES / name / file), strict=True
+            ):
+                np.testing.assert_allclose(ours, theirs, atol=1e-5)
+        else:
+            ours, theirs = (
+                np.asarray(Image.open(folder / file), dtype=float)
+                for folder in (tmp_path, SCENES / name)
+            )
+            # JPEG libraries may round differently; another picture would differ by far more.
+            assert ours.shape == theirs.shape
+            assert np.abs(ours - theirs).mean() < 0.5
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_scene_names_exactly_its_assets_and_is_small(name) -> None:
+    root, _ = scene_files(name)
+    assets = {p for p in (SCENES / name).iterdir() if p.suffix in (".ply", ".jpg")}
+    assert {e.get("value") for e in root.iter("string") if e.get("name") == "filename"} == {
+        p.name for p in assets
+    }
+    assert sum(p.stat().st_size for p in assets) < 1_000_000
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_meshes_are_sound(name) -> None:
+    for path in (SCENES / name).glob("*.ply"):
+        table, triangles = read_ply(path)
+        corners = table[triangles][..., :3]
+        area = np.linalg.norm(
+            np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=-1
+        )
+        assert np.isfinite(table).all()
+        assert len(triangles) <= 15_000
+        # Mitsuba gives a triangle without area a NaN as its face normal.
+        assert (area > 0).all(), path.name
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_frames_lie_in_the_hypercube(name) -> None:
+    _, specification = scene_files(name)
+    dimensions = {"sphere-caustic": 12, "mirror": 2}[name]
+    hard_frames = np.array(specification["hard_frames"])
+    camera_path = np.array(specification["camera_path"])
+    assert hard_frames.shape == (10, dimensions)
+    assert camera_path.shape[1] == dimensions
+    for frames in (hard_frames, camera_path):
+        assert frames.min() >= 0
+        assert frames.max() <= 1
+
+
+def test_sphere_and_light_stay_clear_of_the_room_and_of_each_other() -> None:
+    root, specification = scene_files("sphere-caustic")
+    trim, _ = read_ply(SCENES / "sphere-caustic" / "trim.ply")
+    radius = float(root.find(".//shape[@id='sphere']/float[@name='radius']").get("value"))
+    centre = shape_translation(root, "sphere") + travel(specification, "sphere")
+    light = shape_translation(root, "light") + travel(specification, "light")
+    scale = root.find(".//shape[@id='light']/transform/scale")
+    half = np.array([float(scale.get("x")), 0, float(scale.get("y"))])
+    skirting = 0.02
+    minimum, maximum = trim.min(axis=0), trim.max(axis=0)
+    assert (centre[0] - radius > minimum + np.array([skirting, CLEARANCE, skirting])).all()
+    assert (centre[1] + radius < maximum - skirting).all()
+    assert centre[1, 1] + radius < light[0, 1] - 0.2
+    assert ((light[0] - half) > minimum).all()
+    assert ((light[1] + half) < maximum).all()
+
+
+def share_of_figure_in_mirror(scene_vector):
+    # Seen from the camera's mirror image, what the mirror shows lies inside the pane's outline;
+    # nothing else stands in the way.
+    root, specification = scene_files("mirror")
+    parts = [read_ply(SCENES / "mirror" / f"{name}.ply")[0][:, :3] for name in ("hare", "plinth")]
+    low, high = shape_translation(root, "figure") + travel(specification, "figure")
+    position = low + np.array([scene_vector[0], 0, scene_vector[1]]) * (high - low)
+    points = np.concatenate(parts)[::7] + position
+    outline, _ = read_ply(SCENES / "mirror" / "mirror.ply")
+    lookat = root.find(".//sensor/transform/lookat")
+    camera = np.array([float(c) for c in lookat.get("origin").split(",")])
+    plane = outline[0, 2]
+    behind = camera * [1, 1, -1] + [0, 0, 2 * plane]
+    t = (plane - behind[2]) / (points[:, 2] - behind[2])
+    return points_in_poly((behind + t[:, None] * (points - behind))[:, :2], outline[:, :2]).mean()
+
+
+def test_mirror_shows_the_figure_from_a_narrow_range_only() -> None:
+    grid = [(x, z) for x in np.linspace(0, 1, 41) for z in (0.0, 0.5, 1.0)]
+    visible = np.array([share_of_figure_in_mirror(v) for v in grid])
+    assert 0.15 < (visible > 0).mean() < 0.35
+    assert 0.10 < (visible > 0.5).mean() < 0.30
+    _, specification = scene_files("mirror")
+    assert all(share_of_figure_in_mirror(v) > 0.1 for v in specification["hard_frames"])
+
+
+def test_figure_stays_behind_the_camera_and_clear_of_the_room() -> None:
+    root, specification = scene_files("mirror")
+    hare, _ = read_ply(SCENES / "mirror" / "hare.ply")
+    plinth, _ = read_ply(SCENES / "mirror" / "plinth.ply")
+    points = np.concatenate([hare[:, :3], plinth[:, :3]])
+    low, high = shape_translation(root, "figure") + travel(specification, "figure")
+    frames, _ = read_ply(SCENES / "mirror" / "picture_frames.ply")
+    lookat = root.find(".//sensor/transform/lookat")
+    camera_z = float(lookat.get("origin").split(",")[2])
+    assert (low + points.min(axis=0))[2] > camera_z + 0.2
+    assert (high + points.max(axis=0))[2] < frames[:, 2].min() - CLEARANCE
+    assert (low + points.min(axis=0))[0] > -3.4 + 0.025
+    assert (high + points.max(axis=0))[0] < 3.4 - 0.025
+    assert points[:, 1].min() == 0

@@ -1,0 +1,37 @@
+import logging
+
+import pytest
+
+from ngi import backend
+
+
+def test_unusable_backends_say_why_and_what_to_do(monkeypatch) -> None:
+    monkeypatch.setattr(backend, "_llvm", None)
+    monkeypatch.setattr(backend, "cuda_problem", lambda: "no GPU")
+    with pytest.raises(RuntimeError, match=r"'llvm' does not work here: no usable .*apt-get install"):
+        backend.activate("llvm")
+    with pytest.raises(RuntimeError, match="'cuda' does not work here: no GPU"):
+        backend.activate("cuda")
+
+
+def test_auto_falls_back_to_scalar_with_one_line(monkeypatch, caplog) -> None:
+    monkeypatch.setattr(backend, "_llvm", None)
+    monkeypatch.setattr(backend, "cuda_problem", lambda: "no GPU")
+    backend._say_what_would_be_faster.cache_clear()
+    with caplog.at_level(logging.WARNING):
+        assert backend.activate("auto") == backend.activate("auto") == "scalar_rgb"
+    assert [r.message.count("apt-get install libllvm19") for r in caplog.records] == [1]
+    backend._say_what_would_be_faster.cache_clear()
+
+
+def test_unknown_backend() -> None:
+    with pytest.raises(ValueError, match="'gpu': choose one of"):
+        backend.activate("gpu")
+
+
+def test_auto_takes_llvm_before_scalar(monkeypatch) -> None:
+    monkeypatch.setattr(backend, "cuda_problem", lambda: "no GPU")
+    if (problem := backend.llvm_problem()) is not None:
+        pytest.skip(problem)
+    assert backend.activate("auto") == "llvm_ad_rgb"
+    assert "LLVM" in backend.describe("llvm_ad_rgb")

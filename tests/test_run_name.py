@@ -1,0 +1,23 @@
+import pytest
+
+from ngi.run_name import LONGEST, run_name
+
+
+@pytest.mark.parametrize(
+    ("overrides", "name"),
+    [
+        ("", "default"),
+        (None, "default"),
+        ("sampler=uniform", "sampler=uniform"),
+        ("+sweeps=demo,method=uniform", "sweeps=demo,method=uniform"),
+        ("run.folder=/tmp/x y", "run.folder=_tmp_x_y"),
+    ],
+)
+def test_names_are_readable(overrides: str | None, name: str) -> None:
+    assert run_name(overrides) == name
+
+
+def test_long_names_are_cut_but_stay_apart() -> None:
+    a, b = run_name("x" * 300 + "=1"), run_name("x" * 300 + "=2")
+    assert a != b
+    assert len(a) < LONGEST + 12
