@@ -28,17 +28,18 @@ def error_curve(runs: Sequence[Run], key: str) -> Curve | None:
     """The column `key` of metrics.csv over the runs of one scene and method.
 
     The seeds are evaluated at slightly different times: the curve has the first run's, as far as
-    all runs cover them, and the others are interpolated linearly. None where a run has no such
-    values.
+    all runs cover them, and the others are interpolated linearly. Evaluations that were NaN or
+    Inf are left out. None where a run has no values.
     """
     series = []
     for run in runs:
         if key not in run.history:
             return None
-        finite = run.history[["run_seconds", key]].dropna().sort_values("run_seconds")
-        if finite.empty:
+        points = run.history[["run_seconds", key]].to_numpy(dtype=float)
+        points = points[np.isfinite(points).all(axis=1)]
+        if not len(points):
             return None
-        series.append(finite.to_numpy(dtype=float))
+        series.append(points[points[:, 0].argsort()])
     start = max(points[0, 0] for points in series)
     end = min(points[-1, 0] for points in series)
     if start > end:

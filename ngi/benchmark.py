@@ -70,7 +70,7 @@ def ratio(numerator: Sequence[float], denominator: Sequence[float]) -> list[floa
 
 def generation(scene: str, samples_per_pixel: int, repeats: int) -> list[Figure]:
     """16 patches with every variable, position and resolution new, against one fixed launch."""
-    from ngi.render import MitsubaRenderer
+    from ngi.render.mitsuba_renderer import MitsubaRenderer
 
     renderer = MitsubaRenderer(
         scene=scene_folders()[scene],
@@ -121,7 +121,9 @@ def random_patches(layout: BufferLayout, dimensions: int, count: int = PATCHES) 
     )
 
 
-def training(features: int, layers: int, bf16: bool, repeats: int, dimensions: int = 12) -> list[Figure]:
+def training(
+    features: int, layers: int, bf16: bool, repeats: int, dimensions: int = 12
+) -> list[Figure]:
     """A training step against the matrix rate, and scoring against a training step."""
     device = "cuda" if torch.cuda.is_available() else "cpu"
     dtype = torch.bfloat16 if bf16 else torch.float32

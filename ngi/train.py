@@ -18,8 +18,15 @@ from ngi.run_name import run_name
 
 log = logging.getLogger(__name__)
 
-IRRELEVANT = ("run", "tracker", "label")
-"""Parts of the configuration that do not decide a run's result, and so are not its identity."""
+NOT_IDENTITY = (
+    "run",
+    "tracker",
+    "label",
+    "renderer.scene",
+    "evaluation.evaluator.cache",
+    "evaluation.evaluator.lpips",
+)
+"""Parts of the configuration that do not decide what a run computes: names and places."""
 
 
 def train(config: DictConfig) -> dict[str, Any]:
@@ -103,9 +110,14 @@ def _plain(config: DictConfig) -> dict[str, Any]:
 
 def _settings(config: DictConfig, *, scene_hash: str) -> dict[str, Any]:
     """What decides the result. The scene counts by its content, not by where it lies."""
-    settings = {key: value for key, value in _plain(config).items() if key not in IRRELEVANT}
+    settings = _plain(config)
+    for key in NOT_IDENTITY:
+        *path, last = key.split(".")
+        parent = settings
+        for part in path:
+            parent = parent[part]
+        parent.pop(last, None)
     settings["scene"] = {"name": config.scene.name, "hash": scene_hash}
-    settings["renderer"].pop("scene", None)
     settings["version"] = ngi.__version__
     return settings
 

@@ -8,7 +8,9 @@ from ngi import backend
 def test_unusable_backends_say_why_and_what_to_do(monkeypatch) -> None:
     monkeypatch.setattr(backend, "_llvm", None)
     monkeypatch.setattr(backend, "cuda_problem", lambda: "no GPU")
-    with pytest.raises(RuntimeError, match=r"'llvm' does not work here: no usable .*apt-get install"):
+    with pytest.raises(
+        RuntimeError, match=r"'llvm' does not work here: no usable .*apt-get install"
+    ):
         backend.activate("llvm")
     with pytest.raises(RuntimeError, match="'cuda' does not work here: no GPU"):
         backend.activate("cuda")

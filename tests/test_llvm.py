@@ -40,7 +40,8 @@ def test_newest_usable_library_is_found(libraries) -> None:
     assert found.path == str(libraries / "libLLVM-19.so")
 
 
-def test_every_candidate_has_a_verdict(libraries) -> None:
+@pytest.mark.usefixtures("libraries")
+def test_every_candidate_has_a_verdict() -> None:
     verdicts = {c.path.split("-")[-1]: c for c in llvm.llvm_candidates()}
     assert set(verdicts) == {"14.so", "16.so", "17.so", "19.so", "20.so"}
     assert "older than version 16" in verdicts["14.so"].problem
@@ -57,6 +58,7 @@ def test_environment_wins_where_usable(libraries, monkeypatch) -> None:
     assert llvm.find_llvm().version == (19, 1, 7)
 
 
-def test_none(libraries, monkeypatch) -> None:
+@pytest.mark.usefixtures("libraries")
+def test_none(monkeypatch) -> None:
     monkeypatch.setattr(llvm, "LIBRARY_PATTERNS", ())
     assert llvm.find_llvm() is None

@@ -13,7 +13,7 @@ from torch import Tensor
 
 from ngi.evaluate.metrics import tone_map
 
-ERROR_RANGE = 1.0
+ERROR_RANGE = 0.5
 """Relative error shown as the brightest colour, the same in every picture."""
 
 COLOUR_MAP = "inferno"
@@ -104,10 +104,10 @@ def _draw_colour_bar(sheet: Image.Image, *, left: int, top: int) -> None:
     sheet.paste(Image.fromarray(np.ascontiguousarray(colours)), (left, top))
     draw = ImageDraw.Draw(sheet)
     font = ImageFont.truetype(_font_file(), 12)
-    for value in (0.0, 0.5, 1.0):
-        y = top + (1 - value) * (height - 1)
-        label = f"{value * ERROR_RANGE:g}"
-        if value == 1.0:
+    for fraction in (0.0, 0.5, 1.0):
+        y = top + (1 - fraction) * (height - 1)
+        label = f"{fraction * ERROR_RANGE:g}"
+        if fraction == 1.0:
             label = f"≥ {label}"
         draw.line((left + _BAR_WIDTH, y, left + _BAR_WIDTH + 4, y), fill="black")
         draw.text((left + _BAR_WIDTH + 8, y), label, fill="black", font=font, anchor="lm")

@@ -78,7 +78,8 @@ class TrainingStream(IterableDataset[Batch]):
     """Endless batches of `sampler.chains` patches.
 
     seed: the same seed gives the same batches on the same machine, also across a resume.
-    Raises ValueError where the schedule's first image is smaller than a patch.
+    Raises ValueError where the schedule's first image is smaller than a patch, or the store than
+    two batches.
     """
 
     def __init__(
@@ -98,6 +99,11 @@ class TrainingStream(IterableDataset[Batch]):
             raise ValueError(
                 f"resolution: the image has {schedule.resolution(0)} pixels a side, less than a "
                 f"patch of {renderer.patch_size}; raise resolution or lower renderer.patch_size"
+            )
+        if store.capacity < 2 * sampler.chains:
+            raise ValueError(
+                f"reuse.store.capacity: {store.capacity} patches do not hold the chains' current "
+                f"states and a new batch; expected at least {2 * sampler.chains}"
             )
         self.sampler = sampler
         self.store = store
@@ -139,6 +145,7 @@ class TrainingStream(IterableDataset[Batch]):
         self._pending = None
         losses = feedback.losses.detach().float().cpu()
         with self._clock.phase("explore"):
+            self._chain_info = None
             if proposals is not None:
                 self._accept(batch, proposals, feedback)
         with self._clock.phase("reuse"):
@@ -231,6 +238,7 @@ class TrainingStream(IterableDataset[Batch]):
         self.counters.patches_masked += rendered.masked
         with self._clock.phase("reuse"):
             ids = self.store.add(patches)
+            patches = self.store.get(ids)  # in the precision of every later look at them
             score_current = self.sampler.needs_current and bool(self._chains.occupied.all())
             current = self.store.get(self._chains.patch) if score_current else None
         return Batch(patches, ids, generated=True, current=current), proposals

@@ -133,7 +133,7 @@ def run_with(points: list[tuple[float, float | None]]) -> Run:
 
 
 def test_curve_averages_seeds_at_common_times() -> None:
-    first = run_with([(0.0, 4.0), (10.0, 2.0), (20.0, 1.0)])
+    first = run_with([(0.0, 4.0), (10.0, 2.0), (12.0, float("inf")), (20.0, 1.0)])
     second = run_with([(5.0, 8.0), (15.0, 4.0), (25.0, 2.0)])
     curve = error_curve([first, second], "hard_mape")
     assert curve is not None

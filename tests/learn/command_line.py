@@ -13,7 +13,6 @@ SMALL = [
     "sampler.chains=4",
     "model.hidden_features=16",
     "model.hidden_layers=2",
-    "loss.window_size=7",
     "reuse.policy.bootstrap_batches=5",
     "reuse.policy.beta=1.0",
     "optimizer.lr=1e-3",

@@ -20,9 +20,7 @@ def test_patch_equals_the_same_pixels_of_the_image() -> None:
     image = renderer.render_image(state[0, :3], resolution=20, samples_per_pixel=1, seed=0)
     x, y = (int(p * 13) for p in state[0, 3:])
     torch.testing.assert_close(patch.buffers[0], image.buffers[y : y + 8, x : x + 8])
-    torch.testing.assert_close(
-        patch.log_radiance[0].expm1(), image.radiance[y : y + 8, x : x + 8]
-    )
+    torch.testing.assert_close(patch.log_radiance[0].expm1(), image.radiance[y : y + 8, x : x + 8])
 
 
 @pytest.mark.parametrize("dimensions", [1, 2, 7, 128])
@@ -54,7 +52,9 @@ def test_noise_is_seeded_per_state_and_falls_with_the_samples() -> None:
     noisy = make(noise=0.2, samples_per_pixel=4)
     a = noisy.render_patches(states(4), resolution=16, seed=0).log_radiance
     assert torch.equal(a, noisy.render_patches(states(4), resolution=16, seed=0).log_radiance)
-    assert torch.equal(a[1:2], noisy.render_patches(states(4)[1:2], resolution=16, seed=0).log_radiance)
+    assert torch.equal(
+        a[1:2], noisy.render_patches(states(4)[1:2], resolution=16, seed=0).log_radiance
+    )
     assert not torch.equal(a, noisy.render_patches(states(4), resolution=16, seed=1).log_radiance)
     error = (a.expm1() / clean - 1).std()
     torch.testing.assert_close(error, torch.tensor(0.1), atol=0.01, rtol=0)

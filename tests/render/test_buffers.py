@@ -77,9 +77,7 @@ def test_normal(image, truth) -> None:
     normal = flat[nearest].astype(float)
     on_ball = nearest == 3
     normal[on_ball] = (point[on_ball] - np.array([0, 0.5, 0]) - OFFSET) / 0.3
-    np.testing.assert_allclose(
-        image["normal"][compared], (normal / 2 + 0.5)[compared], atol=2e-3
-    )
+    np.testing.assert_allclose(image["normal"][compared], (normal / 2 + 0.5)[compared], atol=2e-3)
 
 
 def test_outgoing_points_to_the_camera(image, truth) -> None:
@@ -119,7 +117,9 @@ def test_box_filter_averages_over_the_pixel(load_box) -> None:
     image = coarse.render_image(V, resolution=16, samples_per_pixel=1, seed=0).buffers
     blocks = fine.render_image(V, resolution=256, samples_per_pixel=1, seed=0).buffers
     mean = blocks.reshape(16, 16, 16, 16, -1).mean((1, 3))
-    linear = [i for name in ("position", "albedo") for i in range(*fine.layout.slice(name).indices(99))]
+    linear = [
+        i for name in ("position", "albedo") for i in range(*fine.layout.slice(name).indices(99))
+    ]
     difference = (image - mean)[..., linear].abs()
     assert difference.max() < 0.1
     assert difference.mean() < 0.003

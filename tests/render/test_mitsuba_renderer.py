@@ -49,7 +49,7 @@ def test_radiance_agrees_with_mitsubas_own_renderer(renderer, box_folder) -> Non
     z = z_scores(ours, theirs)
     assert abs(ours.mean() / theirs.mean() - 1) < 0.01
     assert 0.8 < np.mean(z**2) < 1.3  # 22 / 20 for Student's t of 22 degrees of freedom
-    assert np.mean(abs(z) > 4) < 2e-3
+    assert np.mean(abs(z) > 4) < 5e-3
 
 
 def test_scalar_and_llvm_agree(load_box) -> None:
@@ -218,7 +218,9 @@ def test_bad_construction(box_folder, tmp_path) -> None:
         MitsubaRenderer(scene=box_folder, backend="metal")
     shutil.copytree(box_folder, tmp_path, dirs_exist_ok=True)
     xml = (tmp_path / "scene.xml").read_text()
-    (tmp_path / "scene.xml").write_text(xml.replace('name="width" value="32"', 'name="width" value="33"'))
+    (tmp_path / "scene.xml").write_text(
+        xml.replace('name="width" value="32"', 'name="width" value="33"')
+    )
     with pytest.raises(ValueError, match="film is 33 x 32; make width and height equal"):
         MitsubaRenderer(scene=tmp_path, backend="scalar")
     (tmp_path / "scene.xml").write_text(xml.replace('type="roughplastic"', 'type="pplastic"'))

@@ -83,9 +83,13 @@ def test_hash_follows_contents_not_place(box, tmp_path) -> None:
 
 
 def test_hash_follows_named_files(box) -> None:
-    edit(box, '<shape type="rectangle" id="back">',
-         '<default name="mesh" value="a.ply"/>\n<shape type="ply"><string name="filename" '
-         'value="$mesh"/></shape>\n<shape type="rectangle" id="back">', "scene.xml")  # fmt: skip
+    edit(
+        box,
+        '<shape type="rectangle" id="back">',
+        '<default name="mesh" value="a.ply"/>\n<shape type="ply"><string name="filename" '
+        'value="$mesh"/></shape>\n<shape type="rectangle" id="back">',
+        "scene.xml",
+    )
     with pytest.raises(FileNotFoundError, match=r"scene.xml: <shape> names 'a.ply'"):
         read_scene(box)
     (box / "a.ply").write_bytes(b"1")
@@ -102,26 +106,46 @@ def test_hash_follows_named_files(box) -> None:
         ("name: box", "name: box\nmax_deth: 3", "unknown key 'max_deth'; did you mean 'max_depth'"),
         ("max_depth: 4", "max_depth: 5", "max_depth is 5, but 4 in the integrator of"),
         ("max_depth: 4", "max_depth: 0", "max_depth is 0; expected a positive integer"),
-        ("samples_per_pixel: 8", "samples_per_pixel: yes", "samples_per_pixel is True; expected int"),
+        (
+            "samples_per_pixel: 8",
+            "samples_per_pixel: yes",
+            "samples_per_pixel is True; expected int",
+        ),
         ("scene: scene.xml", "scene: scen.xml", "scen.xml: no such scene file"),
         ("maximum: [1, 2, 1]", "maximum: [1, 0, 1]", r"bounds.maximum is \[1.0, 0.0, 1.0\]"),
         ("property: albedo", "property: albdo", "property is 'albdo'; choose one of .*'albedo'"),
         ("axes: xz", "axes: zx", r"variables\[2\].axes 'zx': name one to three"),
         ("axes: xz, ", "", r"variables\[2\].axes None: name one to three"),
         ("property: roughness,", "property: roughness, axes: x,", "takes no axes"),
-        ("minimum: 0.1, maximum: 0.5", "minimum: 0.5, maximum: 0.1", r"variables\[3\].maximum is \[0.1\]"),
+        (
+            "minimum: 0.1, maximum: 0.5",
+            "minimum: 0.5, maximum: 0.1",
+            r"variables\[3\].maximum is \[0.1\]",
+        ),
         ("minimum: 0.1, maximum: 0.5", "minimum: 0.5, maximum: 0.5", "must be above minimum"),
         ("minimum: 0.1, maximum: 0.5", "minimum: 0, maximum: 0.5", "roughness lies between 0.001"),
-        ("minimum: 0.5, maximum: 2", "minimum: [0, 1], maximum: 2", r"variables\[4\].minimum is \[0, 1\]; expected 1"),
-        ("minimum: 0.5, maximum: 2", "minimum: 0.5, maximum: .nan", r"variables\[4\].maximum is nan"),
+        (
+            "minimum: 0.5, maximum: 2",
+            "minimum: [0, 1], maximum: 2",
+            r"variables\[4\].minimum is \[0, 1\]; expected 1",
+        ),
+        (
+            "minimum: 0.5, maximum: 2",
+            "minimum: 0.5, maximum: .nan",
+            r"variables\[4\].maximum is nan",
+        ),
         ("object: lamp", "objct: lamp", r"variables\[4\].object is missing"),
         ("object: lamp", "far: 1, object: lamp", r"unknown key 'variables\[4\].far'"),
-        ("object: lamp, property: intensity, minimum: 0.5, maximum: 2", "object: metal, property: roughness, minimum: 0.5, maximum: 0.6", "metal.roughness'; it is there twice"),
+        (
+            "object: lamp, property: intensity, minimum: 0.5, maximum: 2",
+            "object: metal, property: roughness, minimum: 0.5, maximum: 0.6",
+            "metal.roughness'; it is there twice",
+        ),
         ("- [1, 0, 0, 0.2,", "- [2, 0, 0, 0.2,", r"hard_frames\[1\] is \[2.0, .* between 0 and 1"),
         ("- [1, 0, 0, 0.2,", "- [0, 0, 0.2,", r"hard_frames\[1\] is .*expected 10 finite"),
         ("- [1, 1, 1, 1, 1,", "- [1, 1, 1, 1, -1,", r"camera_path\[1\] is"),
     ],
-)  # fmt: skip
+)
 def test_bad_yaml(box, old, new, message) -> None:
     edit(box, old, new)
     with pytest.raises((ValueError, FileNotFoundError), match=message) as error:
@@ -133,10 +157,14 @@ def test_bad_yaml(box, old, new, message) -> None:
     ("old", "new", "message"),
     [
         ("</scene>", "", "scene.xml: not well-formed XML"),
-        ('<integrator type="path">', '<integrator type="path"><boolean name="hide_emitters" value="true"/>', "hide_emitters is true"),
+        (
+            '<integrator type="path">',
+            '<integrator type="path">\n<boolean name="hide_emitters" value="true"/>',
+            "hide_emitters is true",
+        ),
         ("integrator", "x", "not well-formed XML"),
     ],
-)  # fmt: skip
+)
 def test_bad_xml(box, old, new, message) -> None:
     edit(box, old, new, "scene.xml")
     with pytest.raises(ValueError, match=message):

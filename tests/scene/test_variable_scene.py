@@ -30,11 +30,29 @@ def render(scene):
 PROPERTIES = [
     ("nothing", slice(0), [], "<scene", "<scene"),
     ("albedo", slice(3), [0.2, 0.9, 0.4], 'value="0.6, 0.1, 0.1"', 'value="0.2, 0.9, 0.4"'),
-    ("translation of a sphere", slice(3, 6), [1, 0.5, 0.25], 'x="0" y="0.5" z="0"', 'x="0.4" y="0.7" z="-0.2"'),
-    ("translation of an instance", slice(6, 8), [1, 0], 'x="0.5" y="0.2" z="-0.4"', 'x="0.7" y="0.2" z="-0.7"'),
-    ("roughness", slice(8, 9), [0.75], '<float name="alpha" value="0.2"/>', '<float name="alpha" value="0.4"/>'),
+    (
+        "translation of a sphere",
+        slice(3, 6),
+        [1, 0.5, 0.25],
+        'x="0" y="0.5" z="0"',
+        'x="0.4" y="0.7" z="-0.2"',
+    ),
+    (
+        "translation of an instance",
+        slice(6, 8),
+        [1, 0],
+        'x="0.5" y="0.2" z="-0.4"',
+        'x="0.7" y="0.2" z="-0.7"',
+    ),
+    (
+        "roughness",
+        slice(8, 9),
+        [0.75],
+        '<float name="alpha" value="0.2"/>',
+        '<float name="alpha" value="0.4"/>',
+    ),
     ("intensity", slice(9, 10), [1], 'value="10, 8, 6"', 'value="20, 16, 12"'),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("which", "part", "v", "old", "new"), PROPERTIES)
@@ -75,12 +93,17 @@ def test_only_what_changed_is_written(scene, monkeypatch) -> None:
     ("old", "new", "message"),
     [
         ("object: ball", "object: bal", "no object has the id 'bal' .* nearest: ball"),
-        ("object: metal, property: roughness", "object: left_wall, property: roughness", r"'left_wall' \(SmoothDiffuse\) has no parameter alpha"),
+        (
+            "object: metal, property: roughness",
+            "object: left_wall, property: roughness",
+            r"'left_wall' \(SmoothDiffuse\) has no parameter alpha",
+        ),
         ("object: lamp", "object: ball", "'ball' .* name an emitter"),
         ("object: figure, ", "object: metal, ", "a mesh can only move as"),
     ],
-)  # fmt: skip
-def test_unknown_objects_and_properties(tmp_path, scene, old, new, message) -> None:
+)
+@pytest.mark.usefixtures("scene")
+def test_unknown_objects_and_properties(tmp_path, old, new, message) -> None:
     folder = Path(shutil.copytree(BOX, tmp_path / "box"))
     text = (folder / "scene.yaml").read_text()
     assert old in text
