@@ -21,15 +21,14 @@ from tqdm import tqdm
 
 from ngi.explore import LossTimesOutputGradient, LossTimesStep
 from ngi.learn import Batch, Scorer
-from ngi.learn.result import provenance
 from ngi.models import L1Dssim, PixelGenerator
 from ngi.patches import BufferLayout, Patches
+from ngi.provenance import provenance
 from ngi.resources import scene_folders
 from ngi.reuse import PatchStore
 
 PATCHES = 16
 PATCH_SIZE = 32
-LIMITS = {"generation": 1.5, "kernels compiled after warm-up": 0, "store": 48_000}
 
 
 @dataclass(frozen=True)
@@ -70,14 +69,14 @@ def ratio(numerator: Sequence[float], denominator: Sequence[float]) -> list[floa
 
 def generation(scene: str, samples_per_pixel: int, repeats: int) -> list[Figure]:
     """16 patches with every variable, position and resolution new, against one fixed launch."""
+    from ngi.render.measure import FixedLaunch, counted_compilations
     from ngi.render.mitsuba_renderer import MitsubaRenderer
 
     renderer = MitsubaRenderer(
-        scene=scene_folders()[scene],
-        backend="auto",
-        patch_size=PATCH_SIZE,
-        samples_per_pixel=samples_per_pixel,
+        scene=scene_folders()[scene], patch_size=PATCH_SIZE, samples_per_pixel=samples_per_pixel
     )
+    paths = PATCHES * PATCH_SIZE**2 * samples_per_pixel
+    fixed = FixedLaunch(renderer, paths=paths, samples_per_pixel=samples_per_pixel)
     generator = torch.Generator().manual_seed(0)
     calls = iter(range(1_000_000))
 
@@ -86,25 +85,19 @@ def generation(scene: str, samples_per_pixel: int, repeats: int) -> list[Figure]
         states = torch.rand(PATCHES, renderer.dimensions + 2, generator=generator)
         renderer.render_patches(states, resolution=128 + 4 * (call % 100), seed=call)
 
-    paths = PATCHES * PATCH_SIZE**2 * samples_per_pixel
-
-    def fixed() -> None:
-        renderer.trace_fixed_configuration(paths=paths, seed=next(calls))
-
-    varying(), fixed()
-    compiled = renderer.compiled_kernels()
-    ours, theirs = in_turn(repeats, f"generation, {scene}", varying, fixed)
+    ours, theirs = in_turn(
+        repeats, f"generation, {scene}", varying, lambda: fixed.trace(next(calls))
+    )
+    with counted_compilations() as compiled:
+        for _ in range(repeats):
+            varying()
     title = f"{scene}, {samples_per_pixel} spp"
+    patches = f"in {repeats * PATCHES} patches"
     return [
-        figure(f"generation / fixed launch of as many paths ({title})", ratio(ours, theirs), "×", "≤ 1.5"),
+        figure(f"batch / fixed launch, equal paths ({title})", ratio(ours, theirs), "×", "≤ 1.5"),
         figure(f"batch of {PATCHES} patches ({title})", ours, "s"),
         figure(f"paths traced ({title})", [paths / t / 1e6 for t in ours], "Mpaths/s"),
-        figure(
-            "kernels compiled after warm-up",
-            [renderer.compiled_kernels() - compiled],
-            f"in {repeats * PATCHES} patches",
-            "0",
-        ),
+        figure("kernels compiled after warm-up", compiled, patches, "0"),
     ]  # fmt: skip
 
 
@@ -182,8 +175,8 @@ def training(
         figure(f"training step, share of the matrix rate ({name})", share, "%", half),
         figure(f"training step ({name})", [1e3 * t for t in steps], "ms"),
         figure(f"matrix rate ({name})", [p / 1e12 for p in peak], "TFLOP/s"),
-        figure(f"scoring 16 + 16 states, loss × step / training step ({name})", ratio(adam, steps), "×"),
-        figure(f"scoring, loss × output gradient / training step ({name})", ratio(cheap, steps), "×"),
+        figure(f"scoring 16 + 16, loss × step / training step ({name})", ratio(adam, steps), "×"),
+        figure(f"scoring, loss × output gradient / step ({name})", ratio(cheap, steps), "×"),
     ]  # fmt: skip
 
 
@@ -199,12 +192,12 @@ def store(dimensions: int, count: int, repeats: int) -> list[Figure]:
         patches.update(ids, torch.rand(PATCHES))
     generator = torch.Generator().manual_seed(0)
     (draws,) = in_turn(repeats, "store", lambda: patches.get(patches.draw(PATCHES, generator)))
-    size = patches.nbytes / len(patches)
+    size = patches.bytes_per_patch
     title = f"{dimensions} variables"
     return [
         figure(f"store, memory per patch ({title})", [size], "bytes", "≤ 48,000"),
         figure("store, largest error of half precision, log1p radiance in [0, 1]", [error], ""),
-        figure(f"store, drawing {PATCHES} of {len(patches):,} patches", [1e3 * t for t in draws], "ms"),
+        figure(f"store, drawing {PATCHES} of {count:,} patches", [1e3 * t for t in draws], "ms"),
     ]  # fmt: skip
 
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from ngi.learn.result import LIBRARIES
+from ngi.provenance import LIBRARIES
 
 
 @dataclass(frozen=True)
@@ -66,12 +66,12 @@ def torch_device() -> Finding:
 
 
 def llvm() -> Finding:
-    from ngi.llvm import INSTALL_COMMAND, candidates, find_llvm
+    from ngi.llvm import INSTALL_COMMAND, find_llvm, llvm_candidates
 
     chosen = find_llvm()
     if chosen is not None:
-        return Finding("libLLVM (fast CPU renderer)", True, f"{chosen.version}, {chosen.path}")
-    rejected = "; ".join(f"{c.path}: {c.verdict}" for c in candidates()) or "none found"
+        return Finding("libLLVM (fast CPU renderer)", True, str(chosen))
+    rejected = "; ".join(f"{c.path}: {c.problem}" for c in llvm_candidates()) or "none found"
     return Finding("libLLVM (fast CPU renderer)", False, rejected, INSTALL_COMMAND)
 
 
@@ -115,7 +115,7 @@ def renderer() -> Finding:
 def lpips_weights() -> Finding:
     from ngi.evaluate import Lpips
 
-    metric = Lpips(weights=None)
+    metric = Lpips(weights=os.environ.get("NGI_LPIPS_WEIGHTS"))
     detail = "found" if metric.available else "none: the LPIPS column stays empty"
     return Finding("LPIPS weights", metric.available, detail, metric.reason or "")
 

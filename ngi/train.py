@@ -95,7 +95,12 @@ def train(config: DictConfig) -> dict[str, Any]:
         resume_from = learn.prepare_resume(folder)
         recorder.prepare()
         tracker.start(folder=folder.path, settings=settings, label=label)
-        trainer.fit(module, learn.ExplorationDataModule(stream=stream), ckpt_path=resume_from)
+        trainer.fit(
+            module,
+            learn.ExplorationDataModule(stream=stream),
+            ckpt_path=resume_from,
+            weights_only=True,
+        )
         return recorder.finish()
     finally:
         tracker.finish()

@@ -23,13 +23,24 @@ echo "setup: dependencies (a minute or two)"
     fail "pip could not install the dependencies; its message stands above"
 
 # Dr.Jit's fast CPU backend needs libLLVM 17 or newer. Without it everything runs, only slower.
-if ! "$VENV/bin/python" -m ngi.llvm >/dev/null 2>&1 && command -v apt-get >/dev/null 2>&1; then
+llvm() {
+    "$VENV/bin/python" -c '
+import sys
+from ngi.llvm import find_llvm
+library = find_llvm()
+print(f"setup: {library or '"'no usable libLLVM'"'}")
+sys.exit(library is None)'
+}
+
+if ! llvm >/dev/null && command -v apt-get >/dev/null 2>&1; then
     echo "setup: libLLVM (for the fast renderer)"
     root=
     if [ "$(id -u)" != 0 ]; then root="sudo -n"; fi
-    { $root apt-get update && $root env DEBIAN_FRONTEND=noninteractive \
-        apt-get install --yes --no-install-recommends libllvm19; } >"$VENV/apt.log" 2>&1 ||
-        echo "setup: libLLVM could not be installed (see $VENV/apt.log); the slower scalar renderer will be used." \
-             "What would be faster: sudo apt-get install libllvm19"
+    $root apt-get update >"$VENV/apt.log" 2>&1 || true
+    for version in 19 20 21 22 18 17; do
+        $root env DEBIAN_FRONTEND=noninteractive apt-get install --yes --no-install-recommends \
+            "libllvm$version" >>"$VENV/apt.log" 2>&1 && break
+    done
 fi
-"$VENV/bin/python" -m ngi.llvm || true
+llvm || echo "setup: the slower scalar renderer will be used; faster: apt-get install libllvm19" \
+    "(any from 17 on), then make again"

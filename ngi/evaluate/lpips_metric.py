@@ -62,8 +62,8 @@ def _how_to_get_weights(path: Path) -> str:
 
     url = AlexNet_Weights.IMAGENET1K_V1.url
     return (
-        f"no AlexNet weights for LPIPS: save {url} as {path}, "
-        "or name a copy with evaluation.evaluator.lpips.weights=FILE"
+        f"no AlexNet weights for LPIPS: get them by `curl --create-dirs -Lo {path} {url}`, "
+        "or name a copy by NGI_LPIPS_WEIGHTS=FILE"
     )
 
 

@@ -3,11 +3,21 @@
 Lightning imports torchvision through torchmetrics, so torchvision's operators come first.
 """
 
+import logging
+import warnings
+
 from ngi.torchvision_operators import ensure_torchvision_operators
 
 ensure_torchvision_operators()
 
 from lightning import Callback, LightningDataModule, LightningModule, Trainer  # noqa: E402
 from lightning.pytorch.plugins.io import TorchCheckpointIO  # noqa: E402
+
+# Lightning announces hardware, tips and stops at every run; ours are in result.json and the log.
+logging.getLogger("lightning.pytorch").setLevel(logging.WARNING)
+# The stream has a length on purpose (see ngi.learn.stream.ENDLESS) and no worker processes.
+warnings.filterwarnings("ignore", message="Your `IterableDataset` has `__len__` defined")
+# Lightning 2.6.6 uses a name that PyTorch 2.13 deprecates; nothing of ours is concerned.
+warnings.filterwarnings("ignore", message=r"`isinstance\(treespec, LeafSpec\)` is deprecated")
 
 __all__ = ["Callback", "LightningDataModule", "LightningModule", "TorchCheckpointIO", "Trainer"]

@@ -10,10 +10,10 @@ from torch import Tensor
 
 from ngi.evaluate import Evaluation, Evaluator
 from ngi.learn.clock import PhaseClock
-from ngi.learn.result import provenance
 from ngi.learn.run_folder import RunFolder
 from ngi.learn.stream import TrainingStream
 from ngi.learn.tracker import Tracker
+from ngi.provenance import provenance
 
 log = logging.getLogger(__name__)
 

@@ -1,0 +1,15 @@
+"""The neural renderer, its loss, and what it says about single samples. PyTorch only."""
+
+from ngi.models.loss import L1Dssim, SampleLoss
+from ngi.models.patch_linear import PatchLinear
+from ngi.models.pixel_generator import PixelGenerator
+from ngi.models.sample_signals import adam_step_norm, output_gradient_norm
+
+__all__ = [
+    "L1Dssim",
+    "PatchLinear",
+    "PixelGenerator",
+    "SampleLoss",
+    "adam_step_norm",
+    "output_gradient_norm",
+]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import logging
 from pathlib import Path
 
@@ -64,6 +65,9 @@ class MitsubaRenderer:
         )
         scene_description = read_scene(scene)
         self._variant = activate(backend)
+        # Of an earlier scene that is half gone (some objects left in reference cycles) Dr.Jit's
+        # registry still holds the rest, and recording a frozen function trips over it.
+        gc.collect()
         self._scene = VariableScene(scene_description)
         self._require_square_film()
         first_hit = first_hit_of(self._scene)
@@ -145,6 +149,11 @@ class MitsubaRenderer:
             buffers=self._encode(torch.from_numpy(np.concatenate(buffers))),
             radiance=torch.from_numpy(np.concatenate(radiance).astype(np.float32)),
         )
+
+    @property
+    def mitsuba_scene(self) -> mi.Scene:
+        """The scene as it stands, for measurements."""
+        return self._scene.scene
 
     def hard_frames(self) -> Tensor:
         """[10, D]: the scene's hard test frames (paper, Sec. 7.2.1)."""

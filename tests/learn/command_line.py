@@ -23,12 +23,18 @@ SMALL = [
 
 
 def environment(folder: Path) -> dict[str, str]:
-    return {**os.environ, "NGI_CACHE": str(folder / "cache"), "OMP_NUM_THREADS": "1"}
+    return {
+        **os.environ,
+        "NGI_CACHE": str(folder / "cache"),
+        "OMP_NUM_THREADS": "1",
+        "PYTHONPATH": str(folder),
+    }
 
 
-def start(folder: Path, *overrides: str) -> "subprocess.Popen[str]":
+def start(folder: Path, *overrides: str, options: tuple[str, ...] = ()) -> "subprocess.Popen[str]":
+    """options: of Hydra, such as --multirun"""
     return subprocess.Popen(
-        [sys.executable, "-m", "ngi.train", *SMALL, *overrides],
+        [sys.executable, "-m", "ngi.train", *options, *SMALL, *overrides],
         cwd=folder,
         env=environment(folder),
         stdout=subprocess.PIPE,
@@ -37,8 +43,8 @@ def start(folder: Path, *overrides: str) -> "subprocess.Popen[str]":
     )
 
 
-def run(folder: Path, *overrides: str) -> tuple[int, str]:
+def run(folder: Path, *overrides: str, options: tuple[str, ...] = ()) -> tuple[int, str]:
     """Exit status and everything printed."""
-    process = start(folder, *overrides)
+    process = start(folder, *overrides, options=options)
     output, _ = process.communicate(timeout=300)
     return process.returncode, output

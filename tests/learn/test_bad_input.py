@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 import torch
 
-from .command_line import run
+from tests.learn.command_line import run
 
 
 @pytest.mark.parametrize(
@@ -19,7 +19,7 @@ from .command_line import run
         (["evaluation.count=0"], ["evaluation.count"]),
         (["model.hidden_layers=0"], ["hidden_layers"]),
         (["tracker=wandb", "tracker.mode=maybe"], ["tracker.mode", "maybe"]),
-        (["evaluation.evaluator.lpips.weights=/nowhere.pth"], ["nowhere.pth"]),
+        (["run.lpips_weights=/nowhere.pth"], ["nowhere.pth"]),
     ],
 )
 def test_each_error_names_its_key_and_value(

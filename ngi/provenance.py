@@ -1,4 +1,4 @@
-"""The result file of a run: what was computed, from what, on what, and how long it took."""
+"""Where a result comes from: commit, library versions and machine."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-import torch
-
 SCHEMA_VERSION = 1
 
 LIBRARIES = ("torch", "lightning", "mitsuba", "drjit", "hydra-core", "lpips", "numpy")
 
 
 def provenance(*, backend: str) -> dict[str, Any]:
-    """Commit, library versions and machine."""
+    """What every result file begins with. backend: the renderer's description."""
+    import torch  # the doctor reads LIBRARIES where PyTorch may be missing
+
     commit, dirty = _commit()
     return {
         "schema_version": SCHEMA_VERSION,

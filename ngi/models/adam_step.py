@@ -1,0 +1,87 @@
+"""The step that Adam would take for a gradient, without taking it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Self
+
+import torch
+from torch import Tensor
+
+UNSUPPORTED = ("weight_decay", "amsgrad", "maximize")
+
+
+@dataclass(frozen=True)
+class AdamStep:
+    """What Adam would do next to one parameter, as a function of its gradient g.
+
+    With m and v the moments so far and t the number of the step,
+
+        step(g) = −learning_rate · (first + first_gain·g) / (√(second + second_gain·g²) + epsilon),
+        first  = β₁·m / (1 − β₁ᵗ),  first_gain  = (1 − β₁) / (1 − β₁ᵗ),
+        second = β₂·v / (1 − β₂ᵗ),  second_gain = (1 − β₂) / (1 − β₂ᵗ).
+    """
+
+    first: Tensor
+    second: Tensor
+    first_gain: float
+    second_gain: float
+    epsilon: float
+    learning_rate: float
+
+    @classmethod
+    def of(cls, parameter: Tensor, group: Mapping[str, Any], state: Mapping[str, Any]) -> Self:
+        """From the optimiser's parameter group and state, which is empty before the first step."""
+        beta1, beta2 = group["betas"]
+        step = float(state["step"]) + 1 if state else 1.0
+        correction1, correction2 = 1 - beta1**step, 1 - beta2**step
+        zero = torch.zeros_like(parameter, requires_grad=False)
+        return cls(
+            first=state.get("exp_avg", zero) * (beta1 / correction1),
+            second=state.get("exp_avg_sq", zero) * (beta2 / correction2),
+            first_gain=(1 - beta1) / correction1,
+            second_gain=(1 - beta2) / correction2,
+            epsilon=group["eps"],
+            learning_rate=float(group["lr"]),
+        )
+
+    def columns(self, start: int, stop: int) -> Self:
+        """The step of these columns of a weight alone."""
+        return type(self)(
+            first=self.first[:, start:stop].contiguous(),
+            second=self.second[:, start:stop].contiguous(),
+            first_gain=self.first_gain,
+            second_gain=self.second_gain,
+            epsilon=self.epsilon,
+            learning_rate=self.learning_rate,
+        )
+
+    def squared_norm(self, gradients: Tensor) -> Tensor:
+        """‖step(g_i)‖² of n gradients [n, *parameter.shape] of any precision, [n]."""
+        g = gradients.to(self.first.dtype)
+        denominator = torch.addcmul(self.second, g, g, value=self.second_gain)
+        denominator.sqrt_().add_(self.epsilon)
+        step = torch.add(self.first, g, alpha=self.first_gain).div_(denominator)
+        norm = self.learning_rate * torch.linalg.vector_norm(step.flatten(1), dim=1)
+        return norm * norm
+
+
+def adam_groups(optimizer: torch.optim.Optimizer) -> dict[Tensor, dict[str, Any]]:
+    """The parameter group of every parameter of a `torch.optim.Adam`.
+
+    Raises TypeError for another optimiser, ValueError for weight_decay, amsgrad or maximize.
+    """
+    if not isinstance(optimizer, torch.optim.Adam):
+        raise TypeError(
+            f"the norm of an Adam step was asked of {type(optimizer).__name__}: choose "
+            "torch.optim.Adam, or a target that needs no step norm"
+        )
+    for group in optimizer.param_groups:
+        for option in UNSUPPORTED:
+            if group[option]:
+                raise ValueError(
+                    f"optimizer.{option} is {group[option]}, which the norm of an Adam step does "
+                    "not support: switch it off, or choose a target that needs no step norm"
+                )
+    return {p: group for group in optimizer.param_groups for p in group["params"]}

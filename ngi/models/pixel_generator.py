@@ -1,0 +1,146 @@
+"""The neural renderer: from first-intersection buffers and scene vector to radiance, per pixel."""
+
+from __future__ import annotations
+
+import torch
+import torch.nn.functional as F
+from torch import Tensor, nn
+
+from ngi.models.patch_linear import PatchLinear
+from ngi.patches import BufferLayout
+
+RADIANCE_CHANNELS = 3
+EMITTER_THRESHOLD = 1.0
+"""log1p of emitted radiance above which a pixel shows the emitter and nothing else."""
+
+
+class PixelGenerator(nn.Module):
+    """Per-pixel multilayer perceptron with skip connections (paper, Sec. 4.2).
+
+    The position buffer alone goes through the first layer; every later layer, the output layer
+    included, sees [hidden features, all buffers, v]. Emission is no input: it is passed through,
+    in log1p space, by where(emission > 1, emission, output + emission).
+
+    layout: the buffers of the scene
+    scene_dimensions: D, the length of the scene vector v; may be 0
+    hidden_features: width of every hidden layer
+    hidden_layers: number of layers with an activation, the position's included. The release
+        counts only what comes after its first two: its "8" is 10 here (9 without preconditioning)
+    position_preconditioning: False lets the first layer see [all buffers, v] (paper's ablation)
+    negative_slope: of the leaky ReLUs; the release's is PyTorch's default
+
+    Under autocast the inputs keep their precision (see `PatchLinear`), while hidden features and
+    the result are rounded, with bfloat16 by at most 1/256 of their value. The release knows
+    float32 only.
+    """
+
+    def __init__(
+        self,
+        *,
+        layout: BufferLayout,
+        scene_dimensions: int,
+        hidden_features: int = 512,
+        hidden_layers: int = 8,
+        position_preconditioning: bool = True,
+        negative_slope: float = 0.01,
+    ) -> None:
+        super().__init__()
+        if scene_dimensions < 0:
+            raise ValueError(f"scene_dimensions is {scene_dimensions}: it cannot be negative")
+        if hidden_features < 1 or hidden_layers < 1:
+            raise ValueError(
+                f"model.hidden_features is {hidden_features} and model.hidden_layers is "
+                f"{hidden_layers}: both must be at least 1"
+            )
+        if negative_slope < 0:
+            raise ValueError(f"model.negative_slope is {negative_slope}: it cannot be negative")
+        self.layout = layout
+        self.scene_dimensions = scene_dimensions
+        self.position_preconditioning = position_preconditioning
+        self.negative_slope = negative_slope
+        inputs = layout.input_channels
+        if position_preconditioning:
+            position = layout.slice("position")
+            self.input_layer = PatchLinear(
+                pixel_features=[position.stop - position.start],
+                scene_dimensions=0,
+                out_features=hidden_features,
+            )
+        else:
+            self.input_layer = PatchLinear(
+                pixel_features=[inputs],
+                scene_dimensions=scene_dimensions,
+                out_features=hidden_features,
+            )
+        self.hidden = nn.ModuleList(
+            PatchLinear(
+                pixel_features=[hidden_features, inputs],
+                scene_dimensions=scene_dimensions,
+                out_features=hidden_features,
+            )
+            for _ in range(hidden_layers - 1)
+        )
+        self.output_layer = PatchLinear(
+            pixel_features=[hidden_features, inputs],
+            scene_dimensions=scene_dimensions,
+            out_features=RADIANCE_CHANNELS,
+        )
+
+    def forward(self, buffers: Tensor, scene_vector: Tensor) -> Tensor:
+        """log1p of linear RGB radiance, [n, H, W, 3], of the buffers' dtype.
+
+        buffers: [n, H, W, C], channels as the layout says
+        scene_vector: [n, D] in [0, 1]
+        Raises ValueError where these shapes do not fit.
+        """
+        self._check(buffers, scene_vector)
+        pixels = buffers.flatten(1, 2)
+        inputs = pixels[..., : self.layout.input_channels]  # emission is the last of the buffers
+        features = self._activate(self._first_layer(pixels, inputs, scene_vector))
+        for layer in self.hidden:
+            features = self._activate(layer((features, inputs), scene_vector))
+        output = self.output_layer((features, inputs), scene_vector).to(buffers.dtype)
+        return self._pass_emission_through(output.unflatten(1, buffers.shape[1:3]), buffers)
+
+    @torch.no_grad()
+    def render(
+        self, buffers: Tensor, scene_vector: Tensor, pixels_per_chunk: int = 65_536
+    ) -> Tensor:
+        """A whole image, [H, W, C] and v [D] to log1p radiance [H, W, 3], in chunks of pixels.
+
+        The chunks bound the memory and do not change the result. Keeps no gradient.
+        """
+        if pixels_per_chunk < 1:
+            raise ValueError(f"pixels_per_chunk is {pixels_per_chunk}: it must be at least 1")
+        chunks = buffers.flatten(0, 1).split(pixels_per_chunk)
+        output = torch.cat([self(c[None, :, None], scene_vector[None])[0, :, 0] for c in chunks])
+        return output.unflatten(0, buffers.shape[:2])
+
+    def _first_layer(self, pixels: Tensor, inputs: Tensor, scene_vector: Tensor) -> Tensor:
+        if not self.position_preconditioning:
+            return self.input_layer((inputs,), scene_vector)
+        position = pixels[..., self.layout.slice("position")]
+        return self.input_layer((position,), scene_vector[:, :0])
+
+    def _activate(self, features: Tensor) -> Tensor:
+        # In place: PatchLinear's output is kept by nobody else, and memory traffic is what a
+        # step spends beside its matrix products.
+        return F.leaky_relu(features, self.negative_slope, inplace=True)
+
+    def _pass_emission_through(self, output: Tensor, buffers: Tensor) -> Tensor:
+        if "emission" not in self.layout.names:
+            return output
+        emission = buffers[..., self.layout.slice("emission")]
+        return torch.where(emission > EMITTER_THRESHOLD, emission, output + emission)
+
+    def _check(self, buffers: Tensor, scene_vector: Tensor) -> None:
+        if buffers.ndim != 4 or buffers.shape[-1] != self.layout.channels:
+            raise ValueError(
+                f"buffers of shape {list(buffers.shape)}: expected [n, H, W, "
+                f"{self.layout.channels}] for {list(self.layout.names)}"
+            )
+        if scene_vector.shape != (len(buffers), self.scene_dimensions):
+            raise ValueError(
+                f"scene vector of shape {list(scene_vector.shape)}: expected "
+                f"{[len(buffers), self.scene_dimensions]}"
+            )

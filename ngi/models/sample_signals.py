@@ -1,0 +1,138 @@
+"""What each sample would do to the network, for the exploration target (paper, Sec. 5.1).
+
+Nothing here calls `.backward()` or touches a parameter's `.grad`.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+
+from ngi.models.adam_step import AdamStep, adam_groups
+from ngi.models.loss import SampleLoss
+from ngi.models.patch_linear import PatchLinear
+
+
+def output_gradient_norm(prediction: Tensor, target: Tensor, loss: SampleLoss) -> Tensor:
+    """‖∂loss_i / ∂prediction_i‖, [n], by the loss alone: the network is not gone through.
+
+    prediction: [n, P, P, 3] log1p radiance, an output of the network; its graph is left alone
+    target: [n, P, P, 3] log1p radiance as rendered
+    """
+    with torch.enable_grad():
+        output = prediction.detach().requires_grad_()
+        (gradient,) = torch.autograd.grad(loss(output, target).sum(), output)
+    return torch.linalg.vector_norm(gradient.flatten(1), dim=1)
+
+
+def adam_step_norm(
+    model: nn.Module,
+    loss: SampleLoss,
+    optimizer: torch.optim.Optimizer,
+    buffers: Tensor,
+    scene_vector: Tensor,
+    target: Tensor,
+) -> tuple[Tensor, Tensor]:
+    """Loss of each sample, [n], and norm of the Adam step that it alone would cause, [n].
+
+    The norm is that of the total step of all parameters, momentum and RMS included, with the
+    state that the optimiser holds (paper, Sec. 5.1); neither is changed. The release goes through
+    the network once per sample, and takes 1 for the norm before the first step, where this takes
+    the true norm.
+
+    model: a network all of whose parameters belong to `PatchLinear` layers, each called once
+    optimizer: `torch.optim.Adam` over all parameters of the model
+    buffers, scene_vector: the network's input, [n, P, P, C] and [n, D]
+    target: [n, P, P, 3] log1p radiance as rendered
+
+    All samples share one forward pass and one backward pass for the gradients at the layers'
+    outputs. When that pass reaches a layer, the layer's gradients per sample are formed, stepped,
+    summed up and dropped. Autocast covers the matrix products; the rest is done in the
+    parameters' precision.
+
+    Raises TypeError for other models or optimisers, ValueError for options of Adam that are not
+    supported and for an optimiser that does not hold all parameters.
+    """
+    layers = _patch_linear_layers(model)
+    groups = adam_groups(optimizer)
+    if not all(parameter in groups for parameter in model.parameters()):
+        raise ValueError(
+            "the optimizer does not hold every parameter of the model it is asked about"
+        )
+    squared_norms: list[Tensor] = []
+
+    def watch(
+        layer: PatchLinear, arguments: tuple[tuple[Tensor, ...], Tensor], output: Tensor
+    ) -> None:
+        def add_squared_norm(gradient: Tensor) -> None:
+            steps = {
+                p: AdamStep.of(p, groups[p], optimizer.state.get(p, {}))
+                for p in (layer.weight, layer.bias)
+            }
+            pixels, v = arguments
+            squared_norms.append(
+                _squared_norm(steps[layer.weight], steps[layer.bias], pixels, v, gradient)
+            )
+
+        output.register_hook(add_squared_norm)
+
+    handles = [layer.register_forward_hook(watch) for layer in layers]
+    try:
+        with torch.enable_grad():
+            losses = loss(model(buffers, scene_vector), target)
+    finally:
+        for handle in handles:
+            handle.remove()
+    with torch.autocast(buffers.device.type, enabled=False):
+        # Asked for the biases alone, autograd visits every layer but forms no weight's gradient.
+        torch.autograd.grad(losses.sum(), [layer.bias for layer in layers])
+    return losses.detach(), torch.stack(squared_norms).sum(dim=0).sqrt()
+
+
+def _patch_linear_layers(model: nn.Module) -> list[PatchLinear]:
+    layers = [module for module in model.modules() if isinstance(module, PatchLinear)]
+    covered = {parameter for layer in layers for parameter in layer.parameters()}
+    for name, parameter in model.named_parameters():
+        if parameter not in covered:
+            raise TypeError(
+                f"parameter '{name}' belongs to no PatchLinear layer, so its gradient per sample "
+                "is not known: build the network of such layers, or choose a target that needs no "
+                "step norm"
+            )
+    return layers
+
+
+def _squared_norm(
+    weight_step: AdamStep,
+    bias_step: AdamStep,
+    pixels: tuple[Tensor, ...],
+    scene_vector: Tensor,
+    output_gradient: Tensor,
+) -> Tensor:
+    """Squared norm of one layer's step for each sample, [n].
+
+    output_gradient: [n, p, out_features]. The gradient of the weight's columns for one part of
+    the input is output_gradientᵀ · part; for v, the same at every pixel, it is an outer product.
+    """
+    bias_gradient = output_gradient.sum(dim=1).to(scene_vector.dtype)
+    parts = [(output_gradient, part.to(output_gradient.dtype)) for part in pixels]
+    parts.append((bias_gradient[:, None], scene_vector[:, None]))
+    total = bias_step.squared_norm(bias_gradient)
+    start = 0
+    for gradient, part in parts:
+        columns = weight_step.columns(start, start + part.shape[-1])
+        start += part.shape[-1]
+        samples = _samples_per_chunk(columns)
+        total += torch.cat(
+            [
+                columns.squared_norm(g.mT @ p)
+                for g, p in zip(gradient.split(samples), part.split(samples), strict=True)
+            ]
+        )
+    return total
+
+
+def _samples_per_chunk(step: AdamStep) -> int:
+    """How many gradients to treat at a time: on a CPU as many as stay in its cache."""
+    elements = 2**18 if step.first.device.type == "cpu" else 2**26
+    return max(1, elements // max(1, step.first.numel()))
