@@ -44,7 +44,7 @@ class PatchLinear(nn.Linear):
 
 
 def _linear(x: Tensor, weight: Tensor) -> Tensor:
-    """x · weightᵀ; under autocast a full-precision x enters as the sum of two low-precision ones."""
+    """Product x · weightᵀ; under autocast, float32 x enters as the sum of two numbers."""
     device = x.device.type
     if torch.is_autocast_enabled(device) and x.dtype == torch.float32:
         high = x.to(torch.get_autocast_dtype(device))

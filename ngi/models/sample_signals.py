@@ -80,12 +80,13 @@ def adam_step_norm(
     try:
         with torch.enable_grad():
             losses = loss(model(buffers, scene_vector), target)
+            total = losses.sum()
     finally:
         for handle in handles:
             handle.remove()
     with torch.autocast(buffers.device.type, enabled=False):
         # Asked for the biases alone, autograd visits every layer but forms no weight's gradient.
-        torch.autograd.grad(losses.sum(), [layer.bias for layer in layers])
+        torch.autograd.grad(total, [layer.bias for layer in layers])
     return losses.detach(), torch.stack(squared_norms).sum(dim=0).sqrt()
 
 

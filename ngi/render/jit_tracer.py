@@ -7,6 +7,7 @@ window are asked of the sensor directly. Everything that differs from window to 
 
 from __future__ import annotations
 
+import gc
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,19 +58,30 @@ class JitTracer:
 
         self._radiance = dr.freeze(trace_radiance) if frozen else trace_radiance
         self._buffers = dr.freeze(trace_buffers) if frozen else trace_buffers
+        self._clean = not frozen
 
     def radiance(self, window: Window, *, samples: int, seed: int) -> Pending:
+        self._collect_earlier_scenes()
         view = _View.of(window, samples)
         paths = window.width * window.height * samples
         sums = self._radiance(self._scene, view, dr.opaque(mi.UInt32, seed), samples, paths)
         return _pending(sums, window, samples)
 
     def buffers(self, window: Window) -> Pending:
+        self._collect_earlier_scenes()
         samples = self._buffer_samples
         view = _View.of(window, samples)
         rays = window.width * window.height * samples
         sums = self._buffers(self._scene, view, self._points, samples, rays)
         return _pending(sums, window, samples)
+
+    def _collect_earlier_scenes(self) -> None:
+        """Before the first recording: what is left of an earlier scene in reference cycles is
+        still in Dr.Jit's registry, and recording a frozen function trips over it.
+        """
+        if not self._clean:
+            gc.collect()
+            self._clean = True
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import logging
 from pathlib import Path
 
@@ -65,9 +64,6 @@ class MitsubaRenderer:
         )
         scene_description = read_scene(scene)
         self._variant = activate(backend)
-        # Of an earlier scene that is half gone (some objects left in reference cycles) Dr.Jit's
-        # registry still holds the rest, and recording a frozen function trips over it.
-        gc.collect()
         self._scene = VariableScene(scene_description)
         self._require_square_film()
         first_hit = first_hit_of(self._scene)
