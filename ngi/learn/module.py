@@ -42,15 +42,28 @@ class IlluminationModule(LightningModule):
         self.network = network
         self.loss = loss
         self._make_optimizer = optimizer
-        self._scorer = Scorer(target=target, network=network, loss=loss)
-        self._clock = clock
+        self._scorer = Scorer(target=target, network=network, loss=loss, clock=clock)
 
     def configure_optimizers(self) -> torch.optim.Optimizer:
         return self._make_optimizer(self.network.parameters())
 
     def training_step(self, batch: Batch, batch_idx: int) -> dict[str, Any]:  # noqa: ARG002
+        if batch.current is None:
+            losses, _ = self._losses(batch)
+            feedback = Feedback(losses.detach(), None, None)
+        else:
+            optimizer = self.optimizers(use_pl_optimizer=False)
+            assert isinstance(optimizer, torch.optim.Optimizer)
+            with self._scorer.watch(batch.patches, batch.current, optimizer) as score:
+                losses, prediction = self._losses(batch)
+            feedback = Feedback(losses.detach(), *score(prediction, losses))
+        return {"loss": self._mean(losses), "feedback": feedback}
+
+    def _losses(self, batch: Batch) -> tuple[Tensor, Tensor]:
         prediction = self.network(batch.patches.buffers, batch.patches.scene_vector)
-        losses = self.loss(prediction, batch.patches.log_radiance)
+        return self.loss(prediction, batch.patches.log_radiance), prediction
+
+    def _mean(self, losses: Tensor) -> Tensor:
         loss = losses.mean()
         if not torch.isfinite(loss):
             raise FloatingPointError(
@@ -58,16 +71,7 @@ class IlluminationModule(LightningModule):
                 f"{losses.tolist()}); the run stops before the weights are harmed. Start it again "
                 "to go on from its last checkpoint, or lower optimizer.lr"
             )
-        return {"loss": loss, "feedback": self._feedback(batch, prediction, losses)}
-
-    def _feedback(self, batch: Batch, prediction: Tensor, losses: Tensor) -> Feedback:
-        if batch.current is None:
-            return Feedback(losses.detach(), None, None)
-        optimizer = self.optimizers(use_pl_optimizer=False)
-        assert isinstance(optimizer, torch.optim.Optimizer)
-        with self._clock.phase("score"):
-            proposed, current = self._scorer(batch, prediction, losses, optimizer)
-        return Feedback(losses.detach(), proposed, current)
+        return loss
 
     def predict(self, buffers: Tensor, scene_vector: Tensor) -> Tensor:
         """One image: buffers [H, W, C] and v [D] to log1p radiance [H, W, 3] on the CPU."""

@@ -1,63 +1,103 @@
 """Asks the network for the target density of proposed and current chain states.
 
-Scoring has to cost next to nothing (method notes, probes): the proposals are trained on anyway,
-so whatever the training pass already holds (loss, gradient at the output) is taken from it, and
-all chains go through one vectorised pass for the rest.
+Scoring has to cost next to nothing (a sampler that spends a third of its time on it loses to
+uniform sampling at equal time). The proposals are trained on anyway, so that their loss, their
+gradient at the output and the norm of their Adam step are taken from the training pass itself.
+Only the chains' current states go through the network for it, all in one pass.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import torch
 from torch import Tensor, nn
 
 from ngi.explore import Signals, Target
-from ngi.learn.stream import Batch
-from ngi.models import SampleLoss, adam_step_norm, output_gradient_norm
+from ngi.learn.clock import PhaseClock
+from ngi.models import (
+    SampleLoss,
+    adam_step_norm,
+    output_gradient_norm,
+    step_norms_in_backward,
+)
 from ngi.patches import Patches
+
+Scores = tuple[Callable[[], Tensor], Tensor]
+"""Target density of the proposals, [n], known once the backward pass is over, and of the chains'
+current states, [n]."""
 
 
 class Scorer:
-    """Evaluates `target` for a generated batch under the present weights (paper, Sec. 5.1)."""
+    """Evaluates `target` under the present weights (paper, Sec. 5.1)."""
 
-    def __init__(self, *, target: Target, network: nn.Module, loss: SampleLoss) -> None:
+    def __init__(
+        self, *, target: Target, network: nn.Module, loss: SampleLoss, clock: PhaseClock
+    ) -> None:
         self._target = target
         self._network = network
         self._loss = loss
+        self._clock = clock
 
-    def __call__(
-        self, batch: Batch, prediction: Tensor, losses: Tensor, optimizer: torch.optim.Optimizer
-    ) -> tuple[Tensor, Tensor]:
-        """Target density of the proposals and of the current states, each [n].
+    @contextmanager
+    def watch(
+        self, proposed: Patches, current: Patches, optimizer: torch.optim.Optimizer
+    ) -> Iterator[Callable[[Tensor, Tensor], Scores]]:
+        """Watches the forward pass of a training step on `proposed`, made inside the block.
 
-        prediction: [n, P, P, 3] the training pass's output for the proposals, graph attached
-        losses: [n] its loss per sample
+        Gives a function of that pass's output [n, P, P, 3] and losses [n] for the scores. The
+        training loss is the mean of these losses.
         """
-        if batch.current is None:
-            raise ValueError("this batch has no current chain states to score")
-        if "step_norm" in self._target.requires:
-            return self._from_adam_step(batch, optimizer)
-        proposed = self._from_output(prediction, batch.patches, losses)
-        with torch.no_grad():
-            output = self._network(batch.current.buffers, batch.current.scene_vector)
-        current = self._from_output(output.detach().requires_grad_(), batch.current, None)
-        return proposed, current
+        if "step_norm" not in self._target.requires:
+            yield lambda output, losses: self._from_outputs(proposed, current, output, losses)
+            return
+        with step_norms_in_backward(
+            self._network,
+            optimizer,
+            gradient_scale=len(proposed),
+            around=lambda: self._clock.phase("score"),
+        ) as step_norms:
+            yield lambda _output, losses: self._from_adam_steps(
+                current, optimizer, losses.detach(), step_norms
+            )
 
-    def _from_adam_step(
-        self, batch: Batch, optimizer: torch.optim.Optimizer
-    ) -> tuple[Tensor, Tensor]:
-        assert batch.current is not None
-        both = Patches.concatenate([batch.patches, batch.current])
-        losses, norms = adam_step_norm(
-            self._network, self._loss, optimizer, both.buffers, both.scene_vector, both.log_radiance
-        )
-        target = self._target(Signals(loss=losses, step_norm=norms))
-        return target[: len(batch.patches)], target[len(batch.patches) :]
+    def _from_adam_steps(
+        self,
+        current: Patches,
+        optimizer: torch.optim.Optimizer,
+        proposed_losses: Tensor,
+        proposed_norms: Callable[[], Tensor],
+    ) -> Scores:
+        with self._clock.phase("score"):
+            losses, norms = adam_step_norm(
+                self._network,
+                self._loss,
+                optimizer,
+                current.buffers,
+                current.scene_vector,
+                current.log_radiance,
+            )
+            target = self._target(Signals(loss=losses, step_norm=norms))
 
-    def _from_output(self, output: Tensor, patches: Patches, losses: Tensor | None) -> Tensor:
+        def of_proposed() -> Tensor:
+            return self._target(Signals(loss=proposed_losses, step_norm=proposed_norms()))
+
+        return of_proposed, target
+
+    def _from_outputs(
+        self, proposed: Patches, current: Patches, output: Tensor, losses: Tensor
+    ) -> Scores:
+        with self._clock.phase("score"):
+            with torch.no_grad():
+                current_output = self._network(current.buffers, current.scene_vector)
+                current_losses = self._loss(current_output, current.log_radiance)
+            of_proposed = self._evaluate(proposed, output, losses.detach())
+            of_current = self._evaluate(current, current_output, current_losses)
+        return lambda: of_proposed, of_current
+
+    def _evaluate(self, patches: Patches, output: Tensor, losses: Tensor) -> Tensor:
         norms = None
         if "output_gradient_norm" in self._target.requires:
             norms = output_gradient_norm(output, patches.log_radiance, self._loss)
-        if losses is None:
-            with torch.no_grad():
-                losses = self._loss(output, patches.log_radiance)
-        return self._target(Signals(loss=losses.detach(), output_gradient_norm=norms))
+        return self._target(Signals(loss=losses, output_gradient_norm=norms))

@@ -7,7 +7,7 @@ policy would run one step behind the network.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -45,15 +45,16 @@ class Batch:
 
 @dataclass(frozen=True)
 class Feedback:
-    """What the training step learnt from a batch, before the optimiser moved the weights.
+    """What the training step learnt from a batch, all under the weights before that step.
 
     losses: [n] loss per sample
-    target_proposed, target_current: [n] target density of the proposals and of the chains'
-        current states under the same weights; None where nothing had to be scored
+    target_proposed: [n] target density of the proposals, which the step's backward pass brings;
+        None where nothing had to be scored
+    target_current: [n] that of the chains' current states
     """
 
     losses: Tensor
-    target_proposed: Tensor | None
+    target_proposed: Callable[[], Tensor] | None
     target_current: Tensor | None
 
 
@@ -251,7 +252,7 @@ class TrainingStream(IterableDataset[Batch]):
             proposals,
             batch.ids,
             target_current=unscored if current is None else current,
-            target_proposed=unscored if proposed is None else proposed,
+            target_proposed=unscored if proposed is None else proposed(),
             generator=self._generator,
         )
         self.store.pin(self._chains.patch)

@@ -3,7 +3,11 @@
 from ngi.models.loss import L1Dssim, SampleLoss
 from ngi.models.patch_linear import PatchLinear
 from ngi.models.pixel_generator import PixelGenerator
-from ngi.models.sample_signals import adam_step_norm, output_gradient_norm
+from ngi.models.sample_signals import (
+    adam_step_norm,
+    output_gradient_norm,
+    step_norms_in_backward,
+)
 
 __all__ = [
     "L1Dssim",
@@ -12,4 +16,5 @@ __all__ = [
     "SampleLoss",
     "adam_step_norm",
     "output_gradient_norm",
+    "step_norms_in_backward",
 ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import torch
@@ -46,15 +46,20 @@ class AdamStep:
             learning_rate=float(group["lr"]),
         )
 
+    def scaled(self, factor: float) -> Self:
+        """The step for `factor` times the gradient, as a function of the gradient."""
+        return replace(
+            self,
+            first_gain=self.first_gain * factor,
+            second_gain=self.second_gain * factor**2,
+        )
+
     def columns(self, start: int, stop: int) -> Self:
         """The step of these columns of a weight alone."""
-        return type(self)(
+        return replace(
+            self,
             first=self.first[:, start:stop].contiguous(),
             second=self.second[:, start:stop].contiguous(),
-            first_gain=self.first_gain,
-            second_gain=self.second_gain,
-            epsilon=self.epsilon,
-            learning_rate=self.learning_rate,
         )
 
     def squared_norm(self, gradients: Tensor) -> Tensor:

@@ -5,6 +5,9 @@ Nothing here calls `.backward()` or touches a parameter's `.grad`.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+
 import torch
 from torch import Tensor, nn
 
@@ -53,6 +56,35 @@ def adam_step_norm(
     Raises TypeError for other models or optimisers, ValueError for options of Adam that are not
     supported and for an optimiser that does not hold all parameters.
     """
+    with step_norms_in_backward(model, optimizer) as step_norms, torch.enable_grad():
+        losses = loss(model(buffers, scene_vector), target)
+        total = losses.sum()
+    with torch.autocast(buffers.device.type, enabled=False):
+        # Asked for the biases alone, autograd visits every layer but forms no weight's gradient.
+        torch.autograd.grad(total, [layer.bias for layer in _patch_linear_layers(model)])
+    return losses.detach(), step_norms()
+
+
+@contextmanager
+def step_norms_in_backward(
+    model: nn.Module,
+    optimizer: torch.optim.Optimizer,
+    *,
+    gradient_scale: float = 1.0,
+    around: Callable[[], AbstractContextManager[None]] = nullcontext,
+) -> Iterator[Callable[[], Tensor]]:
+    """Has a training step's own backward pass measure what each of its samples would do.
+
+    The model is called once inside the block. Gives a function that returns the norms of
+    `adam_step_norm`, [n], to be called when the backward pass is over and the optimiser has not
+    stepped yet or has: what it was before is what counts.
+
+    gradient_scale: by which the gradients of the samples alone are larger than those that come
+        by; n where the loss is the mean over n samples
+    around: what is entered while the norms are computed, to time them
+
+    Raises as `adam_step_norm`.
+    """
     layers = _patch_linear_layers(model)
     groups = adam_groups(optimizer)
     if not all(parameter in groups for parameter in model.parameters()):
@@ -65,29 +97,22 @@ def adam_step_norm(
         layer: PatchLinear, arguments: tuple[tuple[Tensor, ...], Tensor], output: Tensor
     ) -> None:
         def add_squared_norm(gradient: Tensor) -> None:
-            steps = {
-                p: AdamStep.of(p, groups[p], optimizer.state.get(p, {}))
-                for p in (layer.weight, layer.bias)
-            }
-            pixels, v = arguments
-            squared_norms.append(
-                _squared_norm(steps[layer.weight], steps[layer.bias], pixels, v, gradient)
-            )
+            with around(), torch.no_grad():
+                weight_step, bias_step = (
+                    AdamStep.of(p, groups[p], optimizer.state.get(p, {})).scaled(gradient_scale)
+                    for p in (layer.weight, layer.bias)
+                )
+                pixels, v = arguments
+                squared_norms.append(_squared_norm(weight_step, bias_step, pixels, v, gradient))
 
         output.register_hook(add_squared_norm)
 
     handles = [layer.register_forward_hook(watch) for layer in layers]
     try:
-        with torch.enable_grad():
-            losses = loss(model(buffers, scene_vector), target)
-            total = losses.sum()
+        yield lambda: torch.stack(squared_norms).sum(dim=0).sqrt()
     finally:
         for handle in handles:
             handle.remove()
-    with torch.autocast(buffers.device.type, enabled=False):
-        # Asked for the biases alone, autograd visits every layer but forms no weight's gradient.
-        torch.autograd.grad(total, [layer.bias for layer in layers])
-    return losses.detach(), torch.stack(squared_norms).sum(dim=0).sqrt()
 
 
 def _patch_linear_layers(model: nn.Module) -> list[PatchLinear]:

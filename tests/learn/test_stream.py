@@ -57,7 +57,7 @@ def answer(batch: Batch) -> Feedback:
     losses = batch.patches.log_radiance.mean(dim=(1, 2, 3))
     if batch.current is None:
         return Feedback(losses, None, None)
-    return Feedback(losses, losses, batch.current.log_radiance.mean(dim=(1, 2, 3)))
+    return Feedback(losses, lambda: losses, batch.current.log_radiance.mean(dim=(1, 2, 3)))
 
 
 def steps(stream: TrainingStream, count: int) -> Iterator[Batch]:

@@ -5,7 +5,13 @@ import torch
 from torch import nn
 from torch.func import grad, vmap
 
-from ngi.models import L1Dssim, adam_step_norm, output_gradient_norm, sample_signals
+from ngi.models import (
+    L1Dssim,
+    adam_step_norm,
+    output_gradient_norm,
+    sample_signals,
+    step_norms_in_backward,
+)
 
 from .conftest import plain_forward
 
@@ -191,3 +197,17 @@ def test_output_gradient_norm_of_l1_in_closed_form() -> None:
     with torch.no_grad():
         norms = output_gradient_norm(prediction, target, loss)
     torch.testing.assert_close(norms, torch.full((4,), 2 / (12 * 12 * 3) ** 0.5))
+
+
+def test_a_training_step_measures_its_own_samples(make_model, make_batch) -> None:
+    model = make_model().double()
+    batch = make_batch(model)
+    optimizer = adam(model)
+    train(model, optimizer, batch, 3)
+    _, expected = step_norms(model, optimizer, batch)
+    with step_norms_in_backward(model, optimizer, gradient_scale=len(batch.target)) as norms:
+        losses = LOSS(model(batch.buffers, batch.scene_vector), batch.target)
+    losses.mean().backward()
+    torch.testing.assert_close(norms(), expected)
+    optimizer.step()
+    torch.testing.assert_close(norms(), expected)
