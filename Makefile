@@ -3,10 +3,6 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-# Each process computes in its own threads; waiting ones must not burn the other pool's time.
-export OMP_WAIT_POLICY := passive
-export GOMP_SPINCOUNT := 0
-
 .PHONY: help setup demo test lint smoke benchmark doctor clean
 
 help: ## list the commands

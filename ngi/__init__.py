@@ -1,3 +1,10 @@
 """Neural global illumination of variable scenes by Active Exploration."""
 
+import os
+
 __version__ = "0.1.0"
+
+# PyTorch's waiting threads must not burn the time of Dr.Jit's, which share the cores. OpenMP reads
+# this once, when it is loaded, hence here.
+os.environ.setdefault("OMP_WAIT_POLICY", "passive")
+os.environ.setdefault("GOMP_SPINCOUNT", "0")

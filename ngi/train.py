@@ -13,6 +13,7 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
 
 import ngi
+from ngi.memory import keep_freed_memory
 from ngi.resources import cache_folder, root, scene_folders
 from ngi.run_name import run_name
 
@@ -37,6 +38,7 @@ def train(config: DictConfig) -> dict[str, Any]:
     """
     from ngi import learn  # PyTorch and Lightning take seconds that --help need not wait for
 
+    keep_freed_memory()
     budget = instantiate(config.budget)
     renderer = instantiate(config.renderer)
     settings = _settings(config, scene_hash=renderer.scene_hash)
@@ -94,6 +96,7 @@ def train(config: DictConfig) -> dict[str, Any]:
         )
         resume_from = learn.prepare_resume(folder)
         recorder.prepare()
+        renderer.warm_up()
         tracker.start(folder=folder.path, settings=settings, label=label)
         trainer.fit(
             module,

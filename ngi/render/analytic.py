@@ -62,6 +62,9 @@ class AnalyticRenderer:
         quantity, variable = torch.arange(1.0, 8)[:, None], torch.arange(1.0, dimensions + 1)
         self._weights = 0.5 + torch.frac(quantity * variable * GOLDEN_RATIO)
 
+    def warm_up(self) -> None:
+        """Nothing is compiled."""
+
     def render_patches(self, states: Tensor, *, resolution: int, seed: int) -> RenderedPatches:
         """See `ngi.render.Renderer.render_patches`."""
         check_states(states, self.dimensions)

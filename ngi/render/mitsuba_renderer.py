@@ -89,6 +89,11 @@ class MitsubaRenderer:
         self.scene_hash = scene_description.scene_hash
         self.description = describe(self._variant)
 
+    def warm_up(self) -> None:
+        """See `ngi.render.Renderer.warm_up`."""
+        middle = torch.full((2, self.dimensions + 2), 0.5)
+        self.render_patches(middle, resolution=2 * self.patch_size, seed=0)
+
     def render_patches(self, states: Tensor, *, resolution: int, seed: int) -> RenderedPatches:
         """See `ngi.render.Renderer.render_patches`.
 

@@ -49,6 +49,10 @@ class Renderer(Protocol):
     description: str
     """One line for logs and result files: backend, variant, LLVM or GPU."""
 
+    def warm_up(self) -> None:
+        """Compiles what patches need, so that no run pays for it and the next one does not."""
+        ...
+
     def render_patches(self, states: Tensor, *, resolution: int, seed: int) -> RenderedPatches:
         """Traces one patch per state; only its own pixels.
 

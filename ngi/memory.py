@@ -1,0 +1,25 @@
+"""Keeps freed memory in the process, for speed."""
+
+from __future__ import annotations
+
+import ctypes
+import sys
+
+M_TRIM_THRESHOLD, M_TOP_PAD, M_MMAP_THRESHOLD = -1, -2, -3  # of glibc's malloc.h
+
+
+def keep_freed_memory() -> None:
+    """Has glibc keep large blocks that were freed, instead of giving them back to the kernel.
+
+    Every training step frees and allocates tensors of megabytes; given back, their pages are
+    mapped and zeroed anew each time, which took a fifth of a 6x128 step on two cores. Does
+    nothing where the C library is another one.
+    """
+    if not sys.platform.startswith("linux"):
+        return
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
+    if mallopt is None:
+        return
+    mallopt(M_MMAP_THRESHOLD, 32 * 2**20)  # the largest it accepts
+    mallopt(M_TRIM_THRESHOLD, 2**31 - 1)
+    mallopt(M_TOP_PAD, 64 * 2**20)
