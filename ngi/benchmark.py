@@ -21,7 +21,7 @@ from tqdm import tqdm
 
 from ngi.explore import LossTimesOutputGradient, LossTimesStep
 from ngi.learn import PhaseClock, Scorer
-from ngi.models import L1Dssim, PixelGenerator
+from ngi.models import L1Dssim, PatchLinear, PixelGenerator
 from ngi.patches import BufferLayout, Patches
 from ngi.provenance import provenance
 from ngi.resources import scene_folders
@@ -29,6 +29,9 @@ from ngi.reuse import PatchStore
 
 PATCHES = 16
 PATCH_SIZE = 32
+NETWORKS = ((512, 8, True), (128, 6, False), (128, 6, True))
+"""Hidden features, hidden layers, bf16: the paper's network, and the demo's."""
+STORED_PATCHES = 1024
 
 
 @dataclass(frozen=True)
@@ -166,10 +169,7 @@ def training(
         repeats, f"training, {layers}x{features}", step, matrix_products,
         step_with(LossTimesStep()), step_with(LossTimesOutputGradient()),
     )  # fmt: skip
-    # Forward, gradient of the input and gradient of the weights are one product each per weight
-    # and pixel; the input buffers and v need no gradient.
-    weights = sum(p.numel() for p in network.parameters() if p.dim() == 2)
-    operations = 2 * pixels * (3 * weights - features * layout.input_channels * layers)
+    operations = training_operations(network)
     peak = [2 * pixels * features**2 * products / t for t in matrices]
     name = f"{layers}x{features} {'bf16' if bf16 else 'fp32'}"
     half = "≥ 50 %" if bf16 and features == 512 else ""
@@ -181,6 +181,22 @@ def training(
         figure(f"step with scoring, loss × step / step ({name})", ratio(adam, steps), "×"),
         figure(f"step with scoring, output gradient / step ({name})", ratio(cheap, steps), "×"),
     ]  # fmt: skip
+
+
+def training_operations(network: PixelGenerator) -> int:
+    """Floating-point operations in the matrix products of a step on 16 patches.
+
+    Output, gradient of the weights and gradient of the input are one product each per weight and
+    pixel; buffers need no gradient, and v meets its weights once per patch, which is left out.
+    """
+    products = 0
+    for layer in network.modules():
+        if isinstance(layer, PatchLinear):
+            *pixel_features, _ = layer.widths
+            products += 2 * sum(pixel_features) * layer.out_features
+            if layer is not network.input_layer:
+                products += pixel_features[0] * layer.out_features
+    return 2 * PATCHES * PATCH_SIZE**2 * products
 
 
 def store(dimensions: int, count: int, repeats: int) -> list[Figure]:
@@ -224,10 +240,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     chosen = parser.parse_args(arguments)
     figures = [
         *generation(chosen.scene, chosen.samples_per_pixel, chosen.repeats),
-        *training(512, 8, bf16=True, repeats=chosen.repeats),
-        *training(128, 6, bf16=False, repeats=chosen.repeats),
-        *store(dimensions=12, count=1024, repeats=chosen.repeats),
-        *store(dimensions=128, count=1024, repeats=chosen.repeats),
+        *(f for network in NETWORKS for f in training(*network, repeats=chosen.repeats)),
+        *store(dimensions=12, count=STORED_PATCHES, repeats=chosen.repeats),
+        *store(dimensions=128, count=STORED_PATCHES, repeats=chosen.repeats),
     ]
     print(table(figures))
     chosen.output.parent.mkdir(parents=True, exist_ok=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import os
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import hydra
 from hydra.core.config_store import ConfigStore
@@ -16,6 +16,10 @@ import ngi
 from ngi.memory import keep_freed_memory
 from ngi.resources import cache_folder, root, scene_folders
 from ngi.run_name import run_name
+
+if TYPE_CHECKING:
+    from ngi.learn import Budget, RunFolder, Tracker
+    from ngi.render import Renderer
 
 log = logging.getLogger(__name__)
 
@@ -48,66 +52,69 @@ def train(config: DictConfig) -> dict[str, Any]:
         if folder.result is not None:
             log.info("%s is finished already; delete the folder to run it again", folder.path)
             return folder.result
-        clock = learn.PhaseClock()
-        stream = learn.TrainingStream(
-            renderer=renderer,
-            sampler=instantiate(config.sampler),
-            store=instantiate(config.reuse.store)(layout=renderer.layout),
-            archive=learn.PatchArchive(folder.patches),
-            policy=instantiate(config.reuse.policy),
-            schedule=instantiate(config.resolution),
-            clock=clock,
-            seed=config.seed,
-        )
-        module = learn.IlluminationModule(
-            network=learn.seeded(instantiate(config.model), seed=config.seed)(
-                layout=renderer.layout, scene_dimensions=renderer.dimensions
-            ),
-            loss=instantiate(config.loss),
-            optimizer=instantiate(config.optimizer),
-            target=stream.sampler.target,
-            clock=clock,
-        )
-        label = {**_plain(config.label), "seed": config.seed}
-        recorder = learn.Recorder(
-            evaluator=instantiate(config.evaluation.evaluator)(renderer=renderer),
-            predict=module.predict,
-            folder=folder,
-            stream=stream,
-            clock=clock,
-            tracker=tracker,
-            label=label,
-            backend=renderer.description,
-        )
-        trainer = instantiate(config.trainer)(
-            max_steps=budget.maximum_steps,
-            callbacks=learn.callbacks(
-                stream=stream,
-                clock=clock,
-                folder=folder,
-                tracker=tracker,
-                budget=budget,
-                recorder=recorder,
-                evaluations=config.evaluation.count,
-                checkpoint_seconds=config.run.checkpoint_seconds,
-                checkpoint_steps=config.run.checkpoint_steps,
-            ),
-            plugins=[learn.AtomicCheckpointIO(identity=folder.identity)],
-        )
-        resume_from = learn.prepare_resume(folder)
-        recorder.prepare()
-        renderer.warm_up()
-        tracker.start(folder=folder.path, settings=settings, label=label)
-        trainer.fit(
-            module,
-            learn.ExplorationDataModule(stream=stream),
-            ckpt_path=resume_from,
-            weights_only=True,
-        )
-        return recorder.finish()
+        return _train(config, budget=budget, renderer=renderer, folder=folder, tracker=tracker)
     finally:
         tracker.finish()
         folder.close()
+
+
+def _train(
+    config: DictConfig, *, budget: Budget, renderer: Renderer, folder: RunFolder, tracker: Tracker
+) -> dict[str, Any]:
+    from ngi import learn
+
+    clock = learn.PhaseClock()
+    stream = learn.TrainingStream(
+        renderer=renderer,
+        sampler=instantiate(config.sampler),
+        store=instantiate(config.reuse.store)(layout=renderer.layout),
+        archive=learn.PatchArchive(folder.patches),
+        policy=instantiate(config.reuse.policy),
+        schedule=instantiate(config.resolution),
+        clock=clock,
+        seed=config.seed,
+    )
+    module = learn.IlluminationModule(
+        network=learn.seeded(instantiate(config.model), seed=config.seed)(
+            layout=renderer.layout, scene_dimensions=renderer.dimensions
+        ),
+        loss=instantiate(config.loss),
+        optimizer=instantiate(config.optimizer),
+        target=stream.sampler.target,
+        clock=clock,
+    )
+    recorder = learn.Recorder(
+        evaluator=instantiate(config.evaluation.evaluator)(renderer=renderer),
+        predict=module.predict,
+        folder=folder,
+        stream=stream,
+        clock=clock,
+        tracker=tracker,
+        label={**_plain(config.label), "seed": config.seed},
+        backend=renderer.description,
+    )
+    trainer = instantiate(config.trainer)(
+        max_steps=budget.maximum_steps,
+        callbacks=learn.callbacks(
+            stream=stream,
+            clock=clock,
+            folder=folder,
+            tracker=tracker,
+            budget=budget,
+            recorder=recorder,
+            evaluations=config.evaluation.count,
+            checkpoint_seconds=config.run.checkpoint_seconds,
+            checkpoint_steps=config.run.checkpoint_steps,
+        ),
+        plugins=[learn.AtomicCheckpointIO(identity=folder.identity)],
+    )
+    datamodule = learn.ExplorationDataModule(stream=stream)
+    checkpoint = learn.prepare_resume(folder)
+    recorder.prepare()
+    renderer.warm_up()
+    trainer.fit(module, datamodule, ckpt_path=checkpoint, weights_only=True)
+    module.to(trainer.strategy.root_device)  # Lightning has taken it back to the CPU
+    return recorder.finish()
 
 
 def _plain(config: DictConfig) -> dict[str, Any]:

@@ -6,6 +6,7 @@ from a step before that step's state is saved.
 
 from __future__ import annotations
 
+import logging
 import sys
 from contextlib import AbstractContextManager
 from typing import Any
@@ -19,6 +20,8 @@ from ngi.learn.recorder import Recorder
 from ngi.learn.run_folder import RunFolder
 from ngi.learn.stream import TrainingStream
 from ngi.learn.tracker import Tracker
+
+log = logging.getLogger(__name__)
 
 
 class SamplerFeedback(Callback):
@@ -128,10 +131,12 @@ class BudgetAndCheckpoint(Callback):
         self._every_seconds = every_seconds
         self._every_steps = every_steps
         self._saved_at = 0.0
+        self._saved_step = 0
         self._bar: tqdm[Any] | None = None
 
     def on_train_start(self, *_: Any) -> None:
         self._saved_at = self._clock.run_seconds
+        self._saved_step = self._stream.counters.iteration
         self._bar = tqdm(
             total=100,
             desc=self._folder.path.parent.name,
@@ -149,14 +154,24 @@ class BudgetAndCheckpoint(Callback):
         if used >= 1 or periodic or seconds - self._saved_at >= self._every_seconds:
             with self._clock.phase("checkpoint"):
                 self._save(trainer)
-            self._saved_at = self._clock.run_seconds
+            self._saved_at, self._saved_step = self._clock.run_seconds, steps
         trainer.should_stop = used >= 1
 
     def on_train_end(self, *_: Any) -> None:
         self._close()
 
-    def on_exception(self, *_: Any) -> None:
+    def on_exception(
+        self, _trainer: Trainer, _module: LightningModule, exception: BaseException
+    ) -> None:
         self._close()
+        if isinstance(exception, KeyboardInterrupt):
+            log.warning(
+                "%s: interrupted at step %d; the same command goes on from the last checkpoint, "
+                "step %d",
+                self._folder.path,
+                self._stream.counters.iteration,
+                self._saved_step,
+            )
 
     def _save(self, trainer: Trainer) -> None:
         self._folder.steps.flush()

@@ -46,8 +46,11 @@ class Recorder:
         self._backend = backend
 
     def prepare(self) -> None:
-        """Renders the reference images that are not cached yet."""
+        """Renders the reference images that are not cached yet, and lets the tracker begin."""
         self._evaluator.prepare()
+        self._tracker.start(
+            folder=self._folder.path, settings=self._folder.settings, label=self._label
+        )
 
     def evaluate(self) -> Evaluation:
         """Evaluates the network as it is, and appends a row to metrics.csv."""

@@ -41,7 +41,7 @@ def unbroken(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "run"
 
 
-def kill_after(folder: Path, file: str, delay: float) -> None:
+def stop_after(folder: Path, file: str, delay: float, kind: signal.Signals) -> str:
     process = start(folder, *COMMAND, "run.folder=run")
     deadline = time.monotonic() + 120
     while not (folder / "run" / file).exists():
@@ -49,15 +49,15 @@ def kill_after(folder: Path, file: str, delay: float) -> None:
         assert time.monotonic() < deadline
         time.sleep(0.005)
     time.sleep(delay)
-    process.send_signal(signal.SIGKILL)
-    process.communicate()
+    process.send_signal(kind)
+    return process.communicate()[0]
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.12])
 def test_a_killed_run_ends_bit_for_bit_like_an_unbroken_one(
     tmp_path: Path, unbroken: Path, delay: float
 ) -> None:
-    kill_after(tmp_path, "last.ckpt", delay)
+    stop_after(tmp_path, "last.ckpt", delay, signal.SIGKILL)
     assert not (tmp_path / "run" / "result.json").exists(), "it was not killed in time"
     status, output = run(tmp_path, *COMMAND, "run.folder=run")
     assert status == 0, output
@@ -73,6 +73,12 @@ def test_a_killed_run_ends_bit_for_bit_like_an_unbroken_one(
         for f in (tmp_path / "run", unbroken)
     )
     pd.testing.assert_frame_equal(ours, theirs, check_exact=True)
+
+
+def test_an_interrupted_run_says_how_to_go_on(tmp_path: Path) -> None:
+    output = stop_after(tmp_path, "last.ckpt", 0.05, signal.SIGINT)
+    assert "the same command goes on from the last checkpoint, step" in output
+    assert not (tmp_path / "run" / "result.json").exists()
 
 
 def test_a_finished_run_is_not_run_again(tmp_path: Path, unbroken: Path) -> None:

@@ -1,0 +1,36 @@
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.learn.command_line import run
+
+
+@pytest.mark.parametrize("launcher", ["basic", "joblib"])
+def test_one_failing_job_does_not_lose_the_others(tmp_path: Path, launcher: str) -> None:
+    if launcher == "joblib":
+        pytest.importorskip("hydra_plugins.hydra_joblib_launcher", reason="the extra 'joblib'")
+    status, output = run(
+        tmp_path,
+        "optimizer.lr=-1,1e-3",
+        "seed=0,1",
+        f"hydra/launcher={launcher}",
+        options=("--multirun",),
+    )
+    assert status != 0
+    assert "Invalid learning rate" in output
+    results = sorted((tmp_path / "outputs").rglob("result.json"))
+    assert len(results) == 2
+    assert [json.loads(r.read_text())["seed"] for r in results] == [0, 1]
+    assert {r.parent.parent.name.rsplit("optimizer.lr=", 1)[1].split(",")[0] for r in results} == {
+        "0.001"
+    }
+
+
+def test_weights_and_biases_runs_offline_and_stay_apart(tmp_path: Path) -> None:
+    status, output = run(tmp_path, "tracker=wandb", "seed=0,1", options=("--multirun",))
+    assert status == 0, output
+    runs = sorted((tmp_path / "outputs").rglob("offline-run-*"))
+    assert len(runs) == 2
+    assert len({r.parents[1] for r in runs}) == 2
+    assert all(any(r.glob("*.wandb")) for r in runs)

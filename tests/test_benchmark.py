@@ -1,0 +1,53 @@
+import json
+from pathlib import Path
+
+import pytest
+import torch
+
+from ngi import benchmark
+from ngi.backend import llvm_problem
+from ngi.models import PixelGenerator
+from ngi.patches import BufferLayout
+
+
+def test_a_ratio_compares_neighbours_in_time() -> None:
+    assert benchmark.ratio([2.0, 9.0], [1.0, 3.0]) == [2.0, 3.0]
+    figure = benchmark.figure("x", [4.0, 1.0, 2.0, 3.0, 5.0], "s")
+    assert figure.median == 3
+    assert figure.lower < 3 < figure.upper
+
+
+def test_functions_take_turns() -> None:
+    calls: list[str] = []
+    seconds = benchmark.in_turn(2, "", lambda: calls.append("a"), lambda: calls.append("b"))
+    assert calls == ["a", "b", "a", "b", "a", "b"]
+    assert [len(s) for s in seconds] == [2, 2]
+
+
+def test_operations_are_those_that_pytorch_counts() -> None:
+    from torch.utils.flop_counter import FlopCounterMode
+
+    layout = BufferLayout()
+    network = PixelGenerator(layout=layout, scene_dimensions=3, hidden_features=64, hidden_layers=4)
+    patches = benchmark.random_patches(layout, 3)
+    with FlopCounterMode(display=False) as counter:
+        network(patches.buffers, patches.scene_vector).sum().backward()
+    ours = benchmark.training_operations(network)
+    assert ours == pytest.approx(counter.get_total_flops(), rel=0.02)
+
+
+@pytest.mark.skipif(llvm_problem() is not None, reason=str(llvm_problem()))
+def test_the_benchmark_runs_and_writes_its_figures(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(benchmark, "NETWORKS", ((16, 3, False),))
+    monkeypatch.setattr(benchmark, "STORED_PATCHES", 32)
+    output = tmp_path / "benchmark.json"
+    threads = torch.get_num_threads()
+    assert (
+        benchmark.main(["--repeats", "2", "--samples-per-pixel", "1", "--output", str(output)]) == 0
+    )
+    assert torch.get_num_threads() == threads
+    figures = {f["name"]: f for f in json.loads(output.read_text())["figures"]}
+    assert figures["kernels compiled after warm-up"]["median"] == 0
+    assert all(name in capsys.readouterr().out for name in ["kernels compiled after warm-up"])

@@ -1,0 +1,28 @@
+import pytest
+
+from ngi import doctor
+from ngi.doctor import Finding
+
+
+def test_every_missing_thing_comes_with_what_brings_it() -> None:
+    findings = [check() for check in doctor.CHECKS]
+    for finding in findings:
+        assert finding.detail
+        assert finding.present or finding.remedy, finding
+    text = doctor.report(findings)
+    assert "torch 2." in text
+    assert "libLLVM" in text
+
+
+def test_a_missing_requirement_is_an_error(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    missing = Finding("renderer", False, "gone", "make setup", required=True)
+    optional = Finding("GPU", False, "none", "buy one")
+    monkeypatch.setattr(doctor, "CHECKS", (lambda: missing, lambda: optional))
+    assert doctor.main([]) == 1
+    printed = capsys.readouterr().out
+    assert "MISSING renderer: gone" in printed
+    assert "to get it: make setup" in printed
+    monkeypatch.setattr(doctor, "CHECKS", (lambda: optional,))
+    assert doctor.main([]) == 0
