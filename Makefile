@@ -15,8 +15,8 @@ $(VENV)/.complete: pyproject.toml constraints.txt tools/setup.sh
 	@touch $@
 
 demo: setup ## train exploration and uniform sampling, compare them: 15 minutes
-	@$(BIN)/python -m ngi.train -m +sweeps=demo
-	@$(BIN)/python -m analysis.report outputs/demo
+	@$(BIN)/python -m ngi.train -m +sweeps=demo; status=$$?; \
+	$(BIN)/python -m analysis.report outputs/demo && exit $$status
 
 test: setup lint smoke ## linter, type checker, all tests, smoke run on real renders
 	@$(BIN)/python -m pytest -q

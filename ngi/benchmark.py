@@ -21,6 +21,7 @@ from tqdm import tqdm
 
 from ngi.explore import LossTimesOutputGradient, LossTimesStep
 from ngi.learn import PhaseClock, Scorer
+from ngi.memory import keep_freed_memory
 from ngi.models import L1Dssim, PatchLinear, PixelGenerator
 from ngi.patches import BufferLayout, Patches
 from ngi.provenance import provenance
@@ -79,7 +80,9 @@ def generation(scene: str, samples_per_pixel: int, repeats: int) -> list[Figure]
         scene=scene_folders()[scene], patch_size=PATCH_SIZE, samples_per_pixel=samples_per_pixel
     )
     paths = PATCHES * PATCH_SIZE**2 * samples_per_pixel
-    fixed = FixedLaunch(renderer, paths=paths, samples_per_pixel=samples_per_pixel)
+    fixed = FixedLaunch(
+        scene_folders()[scene] / "scene.xml", paths=paths, samples_per_pixel=samples_per_pixel
+    )
     generator = torch.Generator().manual_seed(0)
     calls = iter(range(1_000_000))
 
@@ -238,6 +241,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--repeats", type=int, default=20, help="timings per figure")
     parser.add_argument("--output", type=Path, default=Path("outputs/benchmark.json"))
     chosen = parser.parse_args(arguments)
+    keep_freed_memory()
     figures = [
         *generation(chosen.scene, chosen.samples_per_pixel, chosen.repeats),
         *(f for network in NETWORKS for f in training(*network, repeats=chosen.repeats)),

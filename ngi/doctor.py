@@ -101,15 +101,23 @@ def optix() -> Finding:
 
 
 def renderer() -> Finding:
-    """Starts the backend that `renderer.backend=auto` would take."""
-    code = "from ngi.backend import activate; print(activate('auto'))"
+    """Which backends work; asked in a child process, since a broken driver can abort it."""
+    code = """
+from ngi.backend import activate, cuda_problem, llvm_problem
+problems = {"cuda": cuda_problem(), "llvm": llvm_problem()}
+print(activate("auto"))
+for name, problem in problems.items():
+    print(f"{name}: {problem or 'works'}")
+"""
     answer = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=False
     )
     if answer.returncode != 0:
         last = (answer.stderr.strip().splitlines() or ["no message"])[-1]
         return Finding("Mitsuba", False, last, "make setup", True)
-    return Finding("Mitsuba", True, f"renders with {answer.stdout.strip().splitlines()[-1]}")
+    variant, *backends = answer.stdout.strip().splitlines()
+    detail = f"renders with {variant} (scalar: works; {'; '.join(backends)})"
+    return Finding("Mitsuba", True, detail)
 
 
 def lpips_weights() -> Finding:
@@ -120,16 +128,17 @@ def lpips_weights() -> Finding:
     return Finding("LPIPS weights", metric.available, detail, metric.reason or "")
 
 
-def compiler() -> Finding:
-    found = shutil.which("g++")
-    return Finding(
-        "g++ (optional, torch.compile)", found is not None, found or "none", "apt-get install g++"
-    )
-
-
 CHECKS: tuple[Callable[[], Finding], ...] = (
-    python, libraries, renderer, llvm, optix, torch_device, lpips_weights, compiler,
+    python, libraries, renderer, llvm, optix, torch_device, lpips_weights,
 )  # fmt: skip
+
+
+def examine(check: Callable[[], Finding]) -> Finding:
+    """The check's finding; a check that can not even be made is one too."""
+    try:
+        return check()
+    except (ImportError, ValueError, OSError) as error:
+        return Finding(check.__name__.replace("_", " "), False, str(error), "make setup", True)
 
 
 def report(findings: Sequence[Finding]) -> str:
@@ -146,7 +155,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point of `python -m ngi.doctor` and `ngi-doctor`."""
     parser = argparse.ArgumentParser(prog="ngi.doctor", description=__doc__)
     parser.parse_args(arguments)
-    findings = [check() for check in CHECKS]
+    findings = [examine(check) for check in CHECKS]
     print(report(findings))
     return int(any(f.required and not f.present for f in findings))
 

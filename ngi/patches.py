@@ -100,5 +100,14 @@ class Patches:
         return replace(self, **{f.name: getattr(self, f.name).to(device) for f in fields(self)})
 
     @classmethod
-    def concatenate(cls, parts: list[Self]) -> Self:
-        return cls(**{f.name: torch.cat([getattr(p, f.name) for p in parts]) for f in fields(cls)})
+    def blank(cls, count: int, *, layout: BufferLayout, dimensions: int, patch_size: int) -> Self:
+        """`count` black patches of a scene with D = `dimensions` variables."""
+        pixels = (count, patch_size, patch_size)
+        return cls(
+            scene_vector=torch.zeros(count, dimensions),
+            position=torch.zeros(count, 2),
+            resolution=torch.full((count,), patch_size),
+            large_step=torch.ones(count, dtype=torch.bool),
+            buffers=torch.zeros(*pixels, layout.channels),
+            log_radiance=torch.zeros(*pixels, 3),
+        )

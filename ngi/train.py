@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import logging
 import os
+import sys
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import hydra
 from hydra.core.config_store import ConfigStore
+from hydra.errors import CompactHydraException
 from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
 
 import ngi
 from ngi.memory import keep_freed_memory
+from ngi.precision import fast_precision
 from ngi.resources import cache_folder, root, scene_folders
 from ngi.run_name import run_name
 
@@ -54,14 +58,16 @@ def train(config: DictConfig) -> dict[str, Any]:
             return folder.result
         return _train(config, budget=budget, renderer=renderer, folder=folder, tracker=tracker)
     finally:
-        tracker.finish()
-        folder.close()
+        with ExitStack() as stack:  # closes both whatever happens in either
+            stack.callback(folder.close)
+            stack.callback(tracker.finish, failed=sys.exc_info()[0] is not None)
 
 
 def _train(
     config: DictConfig, *, budget: Budget, renderer: Renderer, folder: RunFolder, tracker: Tracker
 ) -> dict[str, Any]:
     from ngi import learn
+    from ngi.patches import Patches
 
     clock = learn.PhaseClock()
     stream = learn.TrainingStream(
@@ -94,6 +100,7 @@ def _train(
         backend=renderer.description,
     )
     trainer = instantiate(config.trainer)(
+        default_root_dir=folder.path,
         max_steps=budget.maximum_steps,
         callbacks=learn.callbacks(
             stream=stream,
@@ -109,7 +116,16 @@ def _train(
         plugins=[learn.AtomicCheckpointIO(identity=folder.identity)],
     )
     datamodule = learn.ExplorationDataModule(stream=stream)
+    module.rehearse(
+        Patches.blank(
+            2,
+            layout=renderer.layout,
+            dimensions=renderer.dimensions,
+            patch_size=renderer.patch_size,
+        )
+    )
     checkpoint = learn.prepare_resume(folder)
+    folder.begin()
     recorder.prepare()
     renderer.warm_up()
     trainer.fit(module, datamodule, ckpt_path=checkpoint, weights_only=True)
@@ -144,12 +160,20 @@ def register() -> None:
     for name, folder in scene_folders().items():
         store.store(group="scene", name=name, node={"name": name, "folder": str(folder)})
     OmegaConf.register_new_resolver("run_name", run_name, replace=True)
+    OmegaConf.register_new_resolver("fast_precision", fast_precision, replace=True)
     OmegaConf.register_new_resolver("cache_folder", lambda: str(cache_folder()), replace=True)
 
 
 @hydra.main(version_base="1.3", config_path=str(root() / "conf"), config_name="train")
 def _main(config: DictConfig) -> None:
-    result = train(config)
+    try:
+        result = train(config)
+    except (ValueError, OSError, RuntimeError, FloatingPointError, TypeError) as error:
+        # Hydra reports only the first failed job of a sweep: each says for itself what was wrong,
+        # in its own log too; the traceback is for those who ask for it.
+        log.error("%s", error)
+        log.debug("traceback", exc_info=True)
+        raise CompactHydraException(str(error)) from error
     hard = result["metrics"]["hard"]
     log.info(
         "%s: %s",

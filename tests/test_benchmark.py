@@ -2,7 +2,6 @@ import json
 from pathlib import Path
 
 import pytest
-import torch
 
 from ngi import benchmark
 from ngi.backend import llvm_problem
@@ -43,11 +42,10 @@ def test_the_benchmark_runs_and_writes_its_figures(
     monkeypatch.setattr(benchmark, "NETWORKS", ((16, 3, False),))
     monkeypatch.setattr(benchmark, "STORED_PATCHES", 32)
     output = tmp_path / "benchmark.json"
-    threads = torch.get_num_threads()
-    assert (
-        benchmark.main(["--repeats", "2", "--samples-per-pixel", "1", "--output", str(output)]) == 0
-    )
-    assert torch.get_num_threads() == threads
+    options = ["--repeats", "2", "--samples-per-pixel", "1", "--output", str(output)]
+    assert benchmark.main(options) == 0
     figures = {f["name"]: f for f in json.loads(output.read_text())["figures"]}
     assert figures["kernels compiled after warm-up"]["median"] == 0
-    assert all(name in capsys.readouterr().out for name in ["kernels compiled after warm-up"])
+    assert all(f["median"] > 0 for f in figures.values() if "kernels" not in f["name"])
+    printed = capsys.readouterr().out
+    assert all(name in printed for name in figures)

@@ -26,3 +26,14 @@ def test_a_missing_requirement_is_an_error(
     assert "to get it: make setup" in printed
     monkeypatch.setattr(doctor, "CHECKS", (lambda: optional,))
     assert doctor.main([]) == 0
+
+
+def test_a_check_that_can_not_be_made_is_a_finding(monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_torch() -> Finding:
+        raise ModuleNotFoundError("No module named 'torch'")
+
+    finding = doctor.examine(no_torch)
+    assert (finding.present, finding.required) == (False, True)
+    assert "torch" in finding.detail
+    monkeypatch.setenv("NGI_LPIPS_WEIGHTS", "/nowhere.pth")
+    assert "/nowhere.pth" in doctor.examine(doctor.lpips_weights).detail

@@ -29,17 +29,10 @@ def test_a_buffer_that_is_not_carried_is_named() -> None:
         BufferLayout(("position",)).slice("emission")
 
 
-def test_patches_are_indexed_and_concatenated_field_by_field() -> None:
-    n = 5
-    patches = Patches(
-        scene_vector=torch.rand(n, 2),
-        position=torch.rand(n, 2),
-        resolution=torch.arange(n),
-        large_step=torch.tensor([True, False, True, False, True]),
-        buffers=torch.rand(n, 2, 2, 16),
-        log_radiance=torch.rand(n, 2, 2, 3),
-    )
-    again = Patches.concatenate([patches[:2], patches[torch.tensor([2, 3, 4])]])
-    for name, tensor in vars(patches).items():
-        assert torch.equal(getattr(again, name), tensor)
+def test_patches_are_indexed_field_by_field() -> None:
+    patches = Patches.blank(5, layout=BufferLayout(), dimensions=3, patch_size=4)
+    patches.resolution[:] = torch.arange(5)
+    assert patches.buffers.shape == (5, 4, 4, 16)
+    assert patches[1:3].resolution.tolist() == [1, 2]
+    assert patches[torch.tensor([4, 0])].resolution.tolist() == [4, 0]
     assert len(patches[1:3]) == 2

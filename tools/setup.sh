@@ -6,6 +6,15 @@ set -eu
 PYTHON=${PYTHON:-python3}
 VENV=${VENV:-.venv}
 
+# apt-get without questions, as root or by sudo where that asks for no password.
+apt() {
+    verb=$1
+    shift
+    root=
+    if [ "$(id -u)" != 0 ]; then root="sudo -n"; fi
+    $root env DEBIAN_FRONTEND=noninteractive apt-get "$verb" --yes "$@" >/dev/null 2>&1
+}
+
 fail() { printf 'setup: %s\n' "$1" >&2; exit 1; }
 
 "$PYTHON" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null ||
@@ -13,11 +22,16 @@ fail() { printf 'setup: %s\n' "$1" >&2; exit 1; }
 
 if [ ! -x "$VENV/bin/python" ] || ! "$VENV/bin/python" -m pip --version >/dev/null 2>&1; then
     echo "setup: virtual environment in $VENV"
-    "$PYTHON" -m venv --clear "$VENV" ||
-        fail "could not make a virtual environment; on Debian: apt-get install python3-venv"
+    "$PYTHON" -m venv --clear "$VENV" >/dev/null 2>&1 || {
+        apt update && apt install python3-venv && "$PYTHON" -m venv --clear "$VENV"
+    } || fail "could not make a virtual environment; on Debian: apt-get install python3-venv"
 fi
 
 echo "setup: dependencies (a minute or two)"
+if ! command -v nvidia-smi >/dev/null 2>&1 && [ -z "${PIP_EXTRA_INDEX_URL:-}${PIP_INDEX_URL:-}" ]; then
+    echo "setup: no NVIDIA driver here; if pip fetches PyTorch with gigabytes of CUDA libraries," \
+        "PIP_EXTRA_INDEX_URL=<PyTorch's CPU index> make avoids that"
+fi
 "$VENV/bin/python" -m pip install --quiet --disable-pip-version-check \
     --constraint constraints.txt --editable '.[dev,joblib,slurm]' ||
     fail "pip could not install the dependencies; its message stands above"
@@ -34,12 +48,9 @@ sys.exit(library is None)'
 
 if ! llvm >/dev/null && command -v apt-get >/dev/null 2>&1; then
     echo "setup: libLLVM (for the fast renderer)"
-    root=
-    if [ "$(id -u)" != 0 ]; then root="sudo -n"; fi
-    $root apt-get update >"$VENV/apt.log" 2>&1 || true
+    apt update || true
     for version in 19 20 21 22 18 17; do
-        $root env DEBIAN_FRONTEND=noninteractive apt-get install --yes --no-install-recommends \
-            "libllvm$version" >>"$VENV/apt.log" 2>&1 && break
+        apt install "libllvm$version" && break
     done
 fi
 llvm || echo "setup: the slower scalar renderer will be used; faster: apt-get install libllvm19" \

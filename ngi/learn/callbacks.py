@@ -96,8 +96,7 @@ class PeriodicEvaluation(Callback):
         )
         due = int(used * self._count)
         if used < 1 and due > self._done:
-            with self._clock.phase("evaluate"):
-                self._recorder.evaluate()
+            self._recorder.evaluate()
             self._done = due
 
     def state_dict(self) -> dict[str, Any]:
@@ -134,11 +133,14 @@ class BudgetAndCheckpoint(Callback):
         self._saved_step = 0
         self._bar: tqdm[Any] | None = None
 
-    def on_train_start(self, *_: Any) -> None:
+    def on_train_start(self, trainer: Trainer, *_: Any) -> None:
+        used = self._used()
+        trainer.should_stop = used >= 1  # killed after its last step, before its result
         self._saved_at = self._clock.run_seconds
         self._saved_step = self._stream.counters.iteration
         self._bar = tqdm(
             total=100,
+            initial=100 * min(used, 1.0),
             desc=self._folder.path.parent.name,
             bar_format="{desc} {percentage:3.0f}%|{bar}| {elapsed}<{remaining}{postfix}",
             mininterval=1.0 if sys.stderr.isatty() else 15.0,
@@ -147,8 +149,11 @@ class BudgetAndCheckpoint(Callback):
     def on_train_batch_end(
         self, trainer: Trainer, _module: LightningModule, outputs: Any, *_: Any
     ) -> None:
-        steps, seconds = self._stream.counters.iteration, self._clock.run_seconds
-        used = self._budget.fraction(steps=steps, run_seconds=seconds)
+        steps, seconds, used = (
+            self._stream.counters.iteration,
+            self._clock.run_seconds,
+            self._used(),
+        )
         self._show(min(used, 1.0), float(outputs["loss"]))
         periodic = self._every_steps is not None and steps % self._every_steps == 0
         if used >= 1 or periodic or seconds - self._saved_at >= self._every_seconds:
@@ -173,8 +178,14 @@ class BudgetAndCheckpoint(Callback):
                 self._saved_step,
             )
 
+    def _used(self) -> float:
+        return self._budget.fraction(
+            steps=self._stream.counters.iteration, run_seconds=self._clock.run_seconds
+        )
+
     def _save(self, trainer: Trainer) -> None:
         self._folder.steps.flush()
+        self._folder.metrics.flush()
         trainer.save_checkpoint(self._folder.checkpoint)
         self._stream.prune_archive()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import logging
 import os
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import Any
 
 import torch
 
+from ngi.learn.durable import write_atomically
 from ngi.learn.lightning_api import TorchCheckpointIO
 from ngi.learn.run_folder import RunFolder
 
@@ -21,7 +23,7 @@ IDENTITY = "run_identity"
 class AtomicCheckpointIO(TorchCheckpointIO):
     """Writes beside the old checkpoint, and replaces it only once the new one is on the disk.
 
-    identity: the run's identity, written into the checkpoint and asked for when it is read.
+    identity: the run's identity, written into the checkpoint; `prepare_resume` asks for it.
     """
 
     def __init__(self, *, identity: str) -> None:
@@ -35,20 +37,11 @@ class AtomicCheckpointIO(TorchCheckpointIO):
         storage_options: Any | None = None,  # noqa: ARG002
     ) -> None:
         """Raises OSError with what to do where the disk is full; the old checkpoint stays."""
-        target = Path(path)
-        temporary = target.with_name(target.name + ".tmp")
-        try:
-            with temporary.open("wb") as stream:
-                torch.save({**checkpoint, IDENTITY: self._identity}, stream)
-                stream.flush()
-                os.fsync(stream.fileno())
-            temporary.replace(target)
-        except (OSError, RuntimeError) as error:  # torch.save reports a full disk as RuntimeError
-            temporary.unlink(missing_ok=True)
-            raise OSError(
-                f"{target}: the checkpoint could not be written ({error}); earlier results are "
-                "intact. Make room, and the same command goes on from the last checkpoint"
-            ) from error
+        content = {**checkpoint, IDENTITY: self._identity}
+        # torch.save hides the OSError of a full disk behind an internal RuntimeError: go by memory.
+        buffer = io.BytesIO()
+        torch.save(content, buffer)
+        write_atomically(Path(path), lambda stream: stream.write(buffer.getbuffer()))
 
 
 def prepare_resume(folder: RunFolder) -> Path | None:

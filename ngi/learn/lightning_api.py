@@ -17,6 +17,10 @@ from lightning.pytorch.plugins.io import TorchCheckpointIO  # noqa: E402
 logging.getLogger("lightning.pytorch").setLevel(logging.WARNING)
 # The stream has a length on purpose (see ngi.learn.stream.ENDLESS) and no worker processes.
 warnings.filterwarnings("ignore", message="Your `IterableDataset` has `__len__` defined")
+warnings.filterwarnings("ignore", message=".*does not have many workers")
+# Resuming in the middle of the endless epoch is what datamodule and stream are made for; that it
+# is exact is tested (tests/learn/test_resume.py).
+warnings.filterwarnings("ignore", message=".*your dataloader is not resumable")
 # Lightning 2.6.6 uses a name that PyTorch 2.13 deprecates; nothing of ours is concerned.
 warnings.filterwarnings("ignore", message=r"`isinstance\(treespec, LeafSpec\)` is deprecated")
 

@@ -14,6 +14,7 @@ from ngi.learn.lightning_api import LightningModule
 from ngi.learn.scorer import Scorer
 from ngi.learn.stream import Batch, Feedback
 from ngi.models import SampleLoss
+from ngi.patches import Patches
 
 T = TypeVar("T")
 
@@ -47,29 +48,41 @@ class IlluminationModule(LightningModule):
     def configure_optimizers(self) -> torch.optim.Optimizer:
         return self._make_optimizer(self.network.parameters())
 
+    def rehearse(self, patches: Patches) -> None:
+        """Makes a training step's computations without training, before any long work.
+
+        Raises what would otherwise be raised at the first steps: patches smaller than the loss's
+        window, an optimiser or a network that the target can not score, a wrong learning rate.
+        """
+        optimizer = self._make_optimizer(self.network.parameters())
+        with self._scorer.watch(patches, patches, optimizer) as score:
+            losses, prediction = self._losses(patches)
+        score(prediction, losses)
+
     def training_step(self, batch: Batch, batch_idx: int) -> dict[str, Any]:  # noqa: ARG002
         if batch.current is None:
-            losses, _ = self._losses(batch)
+            losses, _ = self._losses(batch.patches)
             feedback = Feedback(losses.detach(), None, None)
         else:
             optimizer = self.optimizers(use_pl_optimizer=False)
             assert isinstance(optimizer, torch.optim.Optimizer)
             with self._scorer.watch(batch.patches, batch.current, optimizer) as score:
-                losses, prediction = self._losses(batch)
+                losses, prediction = self._losses(batch.patches)
             feedback = Feedback(losses.detach(), *score(prediction, losses))
         return {"loss": self._mean(losses), "feedback": feedback}
 
-    def _losses(self, batch: Batch) -> tuple[Tensor, Tensor]:
-        prediction = self.network(batch.patches.buffers, batch.patches.scene_vector)
-        return self.loss(prediction, batch.patches.log_radiance), prediction
+    def _losses(self, patches: Patches) -> tuple[Tensor, Tensor]:
+        prediction = self.network(patches.buffers, patches.scene_vector)
+        return self.loss(prediction, patches.log_radiance), prediction
 
     def _mean(self, losses: Tensor) -> Tensor:
         loss = losses.mean()
         if not torch.isfinite(loss):
             raise FloatingPointError(
                 f"the loss is {loss.item()} at step {self.global_step} (per sample: "
-                f"{losses.tolist()}); the run stops before the weights are harmed. Start it again "
-                "to go on from its last checkpoint, or lower optimizer.lr"
+                f"{losses.tolist()}); the run stops before the weights are harmed. steps.csv shows "
+                "how it came to this; a lower optimizer.lr is the usual remedy (in a new folder: "
+                "it is another run)"
             )
         return loss
 

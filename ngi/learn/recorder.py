@@ -46,15 +46,16 @@ class Recorder:
         self._backend = backend
 
     def prepare(self) -> None:
-        """Renders the reference images that are not cached yet, and lets the tracker begin."""
-        self._evaluator.prepare()
+        """Lets the tracker begin, and renders the reference images that are not cached yet."""
         self._tracker.start(
             folder=self._folder.path, settings=self._folder.settings, label=self._label
         )
+        self._evaluator.prepare()
 
     def evaluate(self) -> Evaluation:
         """Evaluates the network as it is, and appends a row to metrics.csv."""
-        evaluation = self._evaluator.evaluate(self._predict)
+        with self._clock.phase("evaluate"):
+            evaluation = self._evaluator.evaluate(self._predict)
         row = {
             "step": self._stream.counters.iteration,
             "run_seconds": self._clock.run_seconds,

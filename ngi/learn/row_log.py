@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import csv
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TextIO
+
+from ngi.learn.durable import full_disk_named
 
 
 class RowLog:
@@ -24,11 +27,15 @@ class RowLog:
         if self._writer is None:
             self._open(list(row))
         assert self._writer is not None
-        self._writer.writerow(row)
+        with full_disk_named(self.path):
+            self._writer.writerow(row)
 
     def flush(self) -> None:
+        """Brings every row to the disk. Raises OSError, with what to do, where that is full."""
         if self._stream is not None:
-            self._stream.flush()
+            with full_disk_named(self.path):
+                self._stream.flush()
+                os.fsync(self._stream.fileno())
 
     def keep_until(self, step: int) -> None:
         """Drops rows after `step`: what a run did after its last checkpoint is done again."""
@@ -42,18 +49,20 @@ class RowLog:
         position = next(csv.reader(lines[:1])).index("step")
         kept = lines[:1]
         for line in lines[1:]:
-            fields = next(csv.reader([line]), [])
-            # A last line cut short by a crash has no newline, and its numbers can't be trusted.
-            if line.endswith("\n") and len(fields) > position and int(fields[position]) <= step:
+            fields = next(csv.reader([line.replace("\0", "")]), [])
+            # A line cut short by a crash has no newline or step, and its numbers can't be trusted.
+            whole = line.endswith("\n") and len(fields) > position and fields[position].isdigit()
+            if whole and int(fields[position]) <= step:
                 kept.append(line)
         temporary = self.path.with_name(self.path.name + ".tmp")
         temporary.write_text("".join(kept))
         temporary.replace(self.path)
 
     def close(self) -> None:
-        if self._stream is not None:
-            self._stream.close()
-        self._stream = self._writer = None
+        stream, self._stream, self._writer = self._stream, None, None
+        if stream is not None:
+            with full_disk_named(self.path):
+                stream.close()
 
     def _open(self, columns: list[str]) -> None:
         continued = self.path.exists() and self.path.stat().st_size > 0

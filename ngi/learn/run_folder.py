@@ -5,10 +5,11 @@ from __future__ import annotations
 import fcntl
 import hashlib
 import json
-import os
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, TextIO
 
+from ngi.learn.durable import write_atomically
 from ngi.learn.row_log import RowLog
 
 
@@ -36,7 +37,6 @@ class RunFolder:
         path.mkdir(parents=True, exist_ok=True)
         self._lock = self._acquire_lock()
         self._check_identity()
-        write_atomically(self._settings, json.dumps(settings, indent=2, sort_keys=True))
 
     @property
     def result(self) -> dict[str, Any] | None:
@@ -51,14 +51,18 @@ class RunFolder:
                 "the run again from its last checkpoint"
             ) from error
 
+    def begin(self) -> None:
+        """Makes the folder this run's, once everything is built and training can start."""
+        _write_json(self._settings, self.settings)
+
     def write_result(self, result: dict[str, Any]) -> None:
-        write_atomically(self._result, json.dumps(result, indent=2))
+        _write_json(self._result, result)
 
     def close(self) -> None:
         """Writes the logs out and lets other processes use the folder."""
-        self.metrics.close()
-        self.steps.close()
-        self._lock.close()
+        with ExitStack() as stack:
+            for part in (self._lock, self.steps, self.metrics):
+                stack.callback(part.close)
 
     def _acquire_lock(self) -> TextIO:
         lock = (self.path / ".lock").open("w")
@@ -72,9 +76,17 @@ class RunFolder:
         return lock
 
     def _check_identity(self) -> None:
-        if not self._settings.exists():
+        # A start that failed before its first checkpoint has nothing to lose.
+        if not (self._settings.exists() and (self.checkpoint.exists() or self._result.exists())):
             return
-        earlier = _flatten(json.loads(self._settings.read_text()))
+        try:
+            earlier = _flatten(json.loads(self._settings.read_text()))
+        except ValueError as error:
+            self._lock.close()
+            raise ValueError(
+                f"{self._settings} is damaged ({error}); delete it if you are sure that this "
+                "folder holds the same run"
+            ) from error
         now = _flatten(self.settings)
         different = [
             f"{key}: {earlier.get(key, 'absent')!r} there, {now.get(key, 'absent')!r} now"
@@ -90,14 +102,9 @@ class RunFolder:
             )
 
 
-def write_atomically(path: Path, text: str) -> None:
-    """Writes a file so that a crash leaves either the old content or the new one."""
-    temporary = path.with_name(path.name + ".tmp")
-    with temporary.open("w") as stream:
-        stream.write(text)
-        stream.flush()
-        os.fsync(stream.fileno())
-    temporary.replace(path)
+def _write_json(path: Path, content: dict[str, Any]) -> None:
+    text = json.dumps(content, indent=2, sort_keys=True)
+    write_atomically(path, lambda stream: stream.write(text.encode()))
 
 
 def _flatten(value: Any, prefix: str = "") -> dict[str, Any]:

@@ -9,7 +9,8 @@ Only the chains' current states go through the network for it, all in one pass.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import fields
 
 import torch
 from torch import Tensor, nn
@@ -35,6 +36,12 @@ class Scorer:
     def __init__(
         self, *, target: Target, network: nn.Module, loss: SampleLoss, clock: PhaseClock
     ) -> None:
+        unknown = target.requires - {field.name for field in fields(Signals)}
+        if unknown:
+            raise ValueError(
+                f"sampler.target: {type(target).__name__} requires {sorted(unknown)}; known are "
+                f"{[field.name for field in fields(Signals)]}"
+            )
         self._target = target
         self._network = network
         self._loss = loss
@@ -49,27 +56,36 @@ class Scorer:
         Gives a function of that pass's output [n, P, P, 3] and losses [n] for the scores. The
         training loss is the mean of these losses.
         """
-        if "step_norm" not in self._target.requires:
-            yield lambda output, losses: self._from_outputs(proposed, current, output, losses)
-            return
-        with step_norms_in_backward(
-            self._network,
-            optimizer,
-            gradient_scale=len(proposed),
-            around=lambda: self._clock.phase("score"),
-        ) as step_norms:
-            yield lambda _output, losses: self._from_adam_steps(
-                current, optimizer, losses.detach(), step_norms
+        watched: AbstractContextManager[Callable[[], Tensor | None]] = nullcontext(lambda: None)
+        if "step_norm" in self._target.requires:
+            watched = step_norms_in_backward(
+                self._network,
+                optimizer,
+                gradient_scale=len(proposed),
+                around=lambda: self._clock.phase("score"),
+            )
+        with watched as step_norms:
+            yield lambda output, losses: self._scores(
+                proposed, current, optimizer, output, losses.detach(), step_norms
             )
 
-    def _from_adam_steps(
+    def _scores(
         self,
+        proposed: Patches,
         current: Patches,
         optimizer: torch.optim.Optimizer,
-        proposed_losses: Tensor,
-        proposed_norms: Callable[[], Tensor],
+        output: Tensor,
+        losses: Tensor,
+        step_norms: Callable[[], Tensor | None],
     ) -> Scores:
         with self._clock.phase("score"):
+            gradients = self._output_gradients(proposed, output)
+            of_current = self._target(self._signals(current, optimizer))
+        return lambda: self._target(Signals(losses, gradients, step_norms())), of_current
+
+    def _signals(self, current: Patches, optimizer: torch.optim.Optimizer) -> Signals:
+        losses = norms = gradients = None
+        if "step_norm" in self._target.requires:
             losses, norms = adam_step_norm(
                 self._network,
                 self._loss,
@@ -78,26 +94,14 @@ class Scorer:
                 current.scene_vector,
                 current.log_radiance,
             )
-            target = self._target(Signals(loss=losses, step_norm=norms))
-
-        def of_proposed() -> Tensor:
-            return self._target(Signals(loss=proposed_losses, step_norm=proposed_norms()))
-
-        return of_proposed, target
-
-    def _from_outputs(
-        self, proposed: Patches, current: Patches, output: Tensor, losses: Tensor
-    ) -> Scores:
-        with self._clock.phase("score"):
+        if losses is None or "output_gradient_norm" in self._target.requires:
             with torch.no_grad():
-                current_output = self._network(current.buffers, current.scene_vector)
-                current_losses = self._loss(current_output, current.log_radiance)
-            of_proposed = self._evaluate(proposed, output, losses.detach())
-            of_current = self._evaluate(current, current_output, current_losses)
-        return lambda: of_proposed, of_current
+                output = self._network(current.buffers, current.scene_vector)
+                losses = self._loss(output, current.log_radiance)
+            gradients = self._output_gradients(current, output)
+        return Signals(losses, gradients, norms)
 
-    def _evaluate(self, patches: Patches, output: Tensor, losses: Tensor) -> Tensor:
-        norms = None
-        if "output_gradient_norm" in self._target.requires:
-            norms = output_gradient_norm(output, patches.log_radiance, self._loss)
-        return self._target(Signals(loss=losses, output_gradient_norm=norms))
+    def _output_gradients(self, patches: Patches, output: Tensor) -> Tensor | None:
+        if "output_gradient_norm" not in self._target.requires:
+            return None
+        return output_gradient_norm(output, patches.log_radiance, self._loss)

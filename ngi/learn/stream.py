@@ -119,6 +119,7 @@ class TrainingStream(IterableDataset[Batch]):
         self._generator = torch.Generator().manual_seed(seed)
         self._chains: ChainState = sampler.init(renderer.dimensions + 2)
         self._policy_state = policy.init()
+        self._batch_resolution = self.resolution
         self._saved_store: dict[str, Any] | None = None
         self._pending: tuple[Batch, Proposals | None] | None = None
 
@@ -145,6 +146,7 @@ class TrainingStream(IterableDataset[Batch]):
         batch, proposals = self._pending
         self._pending = None
         losses = feedback.losses.detach().float().cpu()
+        self._batch_resolution = self.resolution
         with self._clock.phase("explore"):
             self._chain_info = None
             if proposals is not None:
@@ -170,7 +172,7 @@ class TrainingStream(IterableDataset[Batch]):
             "store_mean_age": self.store.mean_age,
             "store_mean_loss": self.store.mean_loss,
             "non_finite_losses": self.store.non_finite_losses,
-            "resolution": self.resolution,
+            "resolution": self._batch_resolution,
             **vars(self.counters),
             "acceptance_rate": None if info is None else info.acceptance_rate,
             "large_step_acceptance_rate": None if info is None else info.large_step_acceptance_rate,

@@ -18,7 +18,7 @@ class Tracker(Protocol):
         """A row of numbers with its `step`."""
         ...
 
-    def finish(self) -> None:
+    def finish(self, *, failed: bool) -> None:
         """Called whatever happens, so that the jobs of a sweep stay apart."""
         ...
 
@@ -32,7 +32,7 @@ class Local:
     def log(self, row: Mapping[str, object]) -> None:
         pass
 
-    def finish(self) -> None:
+    def finish(self, *, failed: bool) -> None:
         pass
 
 
@@ -67,7 +67,7 @@ class WeightsAndBiases:
     def log(self, row: Mapping[str, object]) -> None:
         self._run.log({k: v for k, v in row.items() if v is not None}, step=row["step"])
 
-    def finish(self) -> None:
+    def finish(self, *, failed: bool) -> None:
         if self._run is not None:
-            self._run.finish(quiet=True)
+            self._run.finish(exit_code=int(failed), quiet=True)
             self._run = None

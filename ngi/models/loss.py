@@ -90,13 +90,13 @@ class L1Dssim:
     def _ssim(self, x: Tensor, y: Tensor) -> Tensor:
         """Mean structural similarity of each sample, [n], from [n, planes, height, width]."""
         c1, c2 = (self.k1 * self.data_range) ** 2, (self.k2 * self.data_range) ** 2
-        # Variances do not change with a common offset, but E[x²] − E[x]² loses digits with it.
-        offset = y.detach().mean(dim=(2, 3), keepdim=True)
-        x, y = x - offset, y - offset
+        # Offsets change no variance and no covariance, but E[x²] − E[x]² loses digits with them.
+        offset_x, offset_y = (z.detach().mean(dim=(2, 3), keepdim=True) for z in (x, y))
+        x, y = x - offset_x, y - offset_y
         mean_x, mean_y, xx, yy, xy = self._filter(torch.stack([x, y, x * x, y * y, x * y]))
         variances = (xx - mean_x * mean_x) + (yy - mean_y * mean_y)
         covariance = xy - mean_x * mean_y
-        mean_x, mean_y = mean_x + offset, mean_y + offset
+        mean_x, mean_y = mean_x + offset_x, mean_y + offset_y
         luminance = (2 * mean_x * mean_y + c1) / (mean_x * mean_x + mean_y * mean_y + c1)
         structure = (2 * covariance + c2) / (variances + c2)
         return (luminance * structure).mean(dim=(1, 2, 3))

@@ -151,11 +151,6 @@ class MitsubaRenderer:
             radiance=torch.from_numpy(np.concatenate(radiance).astype(np.float32)),
         )
 
-    @property
-    def mitsuba_scene(self) -> mi.Scene:
-        """The scene as it stands, for measurements."""
-        return self._scene.scene
-
     def hard_frames(self) -> Tensor:
         """[10, D]: the scene's hard test frames (paper, Sec. 7.2.1)."""
         return torch.tensor(self._scene.description.hard_frames, dtype=torch.float32)

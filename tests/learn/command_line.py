@@ -5,7 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-SMALL = [
+SIZE = (
     "renderer=analytic",
     "renderer.patch_size=16",
     "resolution=constant",
@@ -16,10 +16,10 @@ SMALL = [
     "reuse.policy.bootstrap_batches=5",
     "reuse.policy.beta=1.0",
     "optimizer.lr=1e-3",
-    "budget=steps",
-    "budget.steps=12",
     "evaluation=smoke",
-]
+)
+SMALL = (*SIZE, "budget=steps", "budget.steps=12")
+BRIEF = (*SIZE, "budget=seconds", "budget.seconds=2")
 
 
 def environment(folder: Path) -> dict[str, str]:
@@ -31,10 +31,12 @@ def environment(folder: Path) -> dict[str, str]:
     }
 
 
-def start(folder: Path, *overrides: str, options: tuple[str, ...] = ()) -> "subprocess.Popen[str]":
-    """options: of Hydra, such as --multirun"""
+def start(
+    folder: Path, *overrides: str, options: tuple[str, ...] = (), base: tuple[str, ...] = SMALL
+) -> "subprocess.Popen[str]":
+    """options: of Hydra, such as --multirun. base: overrides that come before `overrides`."""
     return subprocess.Popen(
-        [sys.executable, "-m", "ngi.train", *options, *SMALL, *overrides],
+        [sys.executable, "-m", "ngi.train", *options, *base, *overrides],
         cwd=folder,
         env=environment(folder),
         stdout=subprocess.PIPE,
@@ -43,8 +45,10 @@ def start(folder: Path, *overrides: str, options: tuple[str, ...] = ()) -> "subp
     )
 
 
-def run(folder: Path, *overrides: str, options: tuple[str, ...] = ()) -> tuple[int, str]:
+def run(
+    folder: Path, *overrides: str, options: tuple[str, ...] = (), base: tuple[str, ...] = SMALL
+) -> tuple[int, str]:
     """Exit status and everything printed."""
-    process = start(folder, *overrides, options=options)
+    process = start(folder, *overrides, options=options, base=base)
     output, _ = process.communicate(timeout=300)
     return process.returncode, output

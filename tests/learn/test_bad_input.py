@@ -4,14 +4,13 @@ from pathlib import Path
 import pytest
 import torch
 
-from tests.learn.command_line import run
+from tests.learn.command_line import BRIEF, run
 
 
 @pytest.mark.parametrize(
     ("overrides", "words"),
     [
         (["budget.steps=0"], ["budget.steps", "0"]),
-        (["budget=seconds", "budget.steps=null", "budget.seconds=0"], ["budget"]),
         (["sampler=surprise"], ["sampler/surprise", "mcmc_loss_step", "uniform"]),
         (["scene=nowhere"], ["scene/nowhere", "sphere-caustic"]),
         (["resolution.resolution=8"], ["resolution", "8", "16", "patch"]),
@@ -20,6 +19,9 @@ from tests.learn.command_line import run
         (["model.hidden_layers=0"], ["hidden_layers"]),
         (["tracker=wandb", "tracker.mode=maybe"], ["tracker.mode", "maybe"]),
         (["run.lpips_weights=/nowhere.pth"], ["nowhere.pth"]),
+        (["renderer.patch_size=8"], ["window", "8 x 8"]),
+        (["optimizer._target_=torch.optim.AdamW"], ["Adam", "AdamW"]),
+        (["optimizer.lr=-1"], ["learning rate", "-1"]),
     ],
 )
 def test_each_error_names_its_key_and_value(
@@ -31,6 +33,12 @@ def test_each_error_names_its_key_and_value(
         assert word in output
     assert not (tmp_path / "run" / "result.json").exists()
     assert not (tmp_path / "run" / "steps.csv").exists()
+
+
+def test_no_seconds_are_no_budget(tmp_path: Path) -> None:
+    status, output = run(tmp_path, "budget.seconds=0", base=BRIEF)
+    assert status != 0
+    assert "budget.seconds: 0 is no budget" in output
 
 
 @pytest.fixture(scope="module")

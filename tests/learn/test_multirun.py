@@ -6,10 +6,11 @@ import pytest
 from tests.learn.command_line import run
 
 
-@pytest.mark.parametrize("launcher", ["basic", "joblib"])
+@pytest.mark.parametrize("launcher", ["basic", "joblib", "submitit_local"])
 def test_one_failing_job_does_not_lose_the_others(tmp_path: Path, launcher: str) -> None:
-    if launcher == "joblib":
-        pytest.importorskip("hydra_plugins.hydra_joblib_launcher", reason="the extra 'joblib'")
+    if launcher != "basic":
+        plugin = launcher.partition("_")[0]
+        pytest.importorskip(f"hydra_plugins.hydra_{plugin}_launcher", reason="an extra is missing")
     status, output = run(
         tmp_path,
         "optimizer.lr=-1,1e-3",

@@ -1,3 +1,4 @@
+import json
 import signal
 import time
 from pathlib import Path
@@ -7,9 +8,10 @@ import pandas as pd
 import pytest
 import torch
 
-from tests.learn.command_line import run, start
+from ngi.learn.clock import PHASES
+from tests.learn.command_line import BRIEF, SMALL, run, start
 
-COMMAND = ("budget.steps=60", "run.checkpoint_steps=7")
+COMMAND = ("budget.steps=90", "run.checkpoint_steps=7")
 
 
 def assert_same(a: Any, b: Any, path: str = "") -> None:
@@ -41,8 +43,14 @@ def unbroken(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "run"
 
 
-def stop_after(folder: Path, file: str, delay: float, kind: signal.Signals) -> str:
-    process = start(folder, *COMMAND, "run.folder=run")
+def stop_after(
+    folder: Path,
+    file: str,
+    delay: float,
+    kind: signal.Signals,
+    options: tuple[str, ...] = (*SMALL, *COMMAND, "run.folder=run"),
+) -> str:
+    process = start(folder, *options, base=())
     deadline = time.monotonic() + 120
     while not (folder / "run" / file).exists():
         assert process.poll() is None, process.communicate()[0]
@@ -62,6 +70,7 @@ def test_a_killed_run_ends_bit_for_bit_like_an_unbroken_one(
     status, output = run(tmp_path, *COMMAND, "run.folder=run")
     assert status == 0, output
     assert "going on from step" in output
+    assert "resumable" not in output
     assert_same(final_state(tmp_path / "run"), final_state(unbroken))
     for name in sorted(p.name for p in (unbroken / "patches").iterdir()):
         assert_same(
@@ -73,6 +82,49 @@ def test_a_killed_run_ends_bit_for_bit_like_an_unbroken_one(
         for f in (tmp_path / "run", unbroken)
     )
     pd.testing.assert_frame_equal(ours, theirs, check_exact=True)
+
+
+def test_real_renders_with_growing_resolution_resume_bit_for_bit(tmp_path: Path) -> None:
+    options = (
+        "experiment=smoke",
+        "scene=mirror",
+        "budget.steps=24",
+        "resolution=growing",
+        "resolution.start=40",
+        "resolution.every=6",
+        "run.checkpoint_steps=5",
+        "run.folder=run",
+    )
+    (tmp_path / "a").mkdir()
+    (tmp_path / "b").mkdir()
+    assert run(tmp_path / "a", *options, base=())[0] == 0
+    stop_after(tmp_path / "b", "last.ckpt", 0.0, signal.SIGKILL, options)
+    assert not (tmp_path / "b" / "run" / "result.json").exists(), "it was not killed in time"
+    assert run(tmp_path / "b", *options, base=())[0] == 0
+    assert_same(final_state(tmp_path / "a" / "run"), final_state(tmp_path / "b" / "run"))
+
+
+def test_a_budget_in_seconds_is_run_time_and_is_not_overdrawn_on_resume(tmp_path: Path) -> None:
+    status, output = run(tmp_path, "run.folder=run", base=BRIEF)
+    assert status == 0, output
+    folder = tmp_path / "run"
+    result = json.loads((folder / "result.json").read_text())
+    assert 2 <= result["run_seconds"] < 3
+    named = sum(result["seconds"][phase] for phase in PHASES)
+    assert named == pytest.approx(result["run_seconds"], abs=0.01)
+    assert result["seconds"]["evaluate"] > 0
+    steps, metrics = (pd.read_csv(folder / name)["step"] for name in ("steps.csv", "metrics.csv"))
+    assert result["steps"] == steps.iloc[-1] == metrics.iloc[-1]
+    assert metrics.is_unique
+    assert len(metrics) == 2
+
+    (folder / "result.json").unlink()  # killed after its last step, before its result
+    status, output = run(tmp_path, "run.folder=run", base=BRIEF)
+    assert status == 0, output
+    again = json.loads((folder / "result.json").read_text())
+    assert again["steps"] == result["steps"]
+    assert again["metrics"] == result["metrics"]
+    assert pd.read_csv(folder / "metrics.csv")["step"].tolist() == metrics.tolist()
 
 
 def test_an_interrupted_run_says_how_to_go_on(tmp_path: Path) -> None:
@@ -101,7 +153,7 @@ def test_another_seed_gives_another_run(tmp_path: Path, unbroken: Path) -> None:
 
 def test_the_log_has_one_row_per_step(unbroken: Path) -> None:
     steps = pd.read_csv(unbroken / "steps.csv")
-    assert steps["step"].tolist() == list(range(1, 61))
+    assert steps["step"].tolist() == list(range(1, 91))
     always = ["reuse_probability", "store_size", "store_mean_age", "loss", "resolution"]
     assert steps[always].notna().all().all()
     generated = steps["generated_batches"].diff() > 0

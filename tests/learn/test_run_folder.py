@@ -20,6 +20,7 @@ def test_same_settings_same_identity_in_any_order(tmp_path: Path) -> None:
 
 def test_another_run_is_refused_and_nothing_is_touched(tmp_path: Path) -> None:
     first = RunFolder(tmp_path, settings=SETTINGS)
+    first.begin()
     first.write_result({"finished": True})
     first.close()
     before = {p.name: p.read_bytes() for p in tmp_path.iterdir()}
@@ -52,3 +53,25 @@ def test_unfinished_run_has_no_result(tmp_path: Path) -> None:
     folder = RunFolder(tmp_path, settings=SETTINGS)
     assert folder.result is None
     folder.close()
+
+
+def test_a_start_that_failed_early_does_not_claim_the_folder(tmp_path: Path) -> None:
+    failed = RunFolder(tmp_path, settings=SETTINGS)
+    failed.begin()
+    failed.close()
+    mended = RunFolder(tmp_path, settings={**SETTINGS, "seed": 3})
+    mended.begin()
+    mended.checkpoint.write_bytes(b"")
+    mended.close()
+    with pytest.raises(ValueError, match="seed: 3 there, 0 now"):
+        RunFolder(tmp_path, settings=SETTINGS)
+
+
+def test_damaged_settings_are_named(tmp_path: Path) -> None:
+    folder = RunFolder(tmp_path, settings=SETTINGS)
+    folder.begin()
+    folder.write_result({})
+    folder.close()
+    (tmp_path / "settings.json").write_text("{")
+    with pytest.raises(ValueError, match=r"settings\.json is damaged"):
+        RunFolder(tmp_path, settings=SETTINGS)
