@@ -10,7 +10,7 @@ from typing import Any
 
 import torch
 
-from ngi.learn.durable import write_atomically
+from ngi.durable import write_atomically
 from ngi.learn.lightning_api import TorchCheckpointIO
 from ngi.learn.run_folder import RunFolder
 
@@ -41,7 +41,7 @@ class AtomicCheckpointIO(TorchCheckpointIO):
         # torch.save hides the OSError of a full disk behind an internal RuntimeError: go by memory.
         buffer = io.BytesIO()
         torch.save(content, buffer)
-        write_atomically(Path(path), lambda stream: stream.write(buffer.getbuffer()))
+        write_atomically(Path(path), buffer.getbuffer())
 
 
 def prepare_resume(folder: RunFolder) -> Path | None:

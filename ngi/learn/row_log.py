@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TextIO
 
-from ngi.learn.durable import full_disk_named
+from ngi.durable import full_disk_named
 
 
 class RowLog:

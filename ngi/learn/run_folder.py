@@ -9,7 +9,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, TextIO
 
-from ngi.learn.durable import write_atomically
+from ngi.durable import write_atomically
 from ngi.learn.row_log import RowLog
 
 
@@ -104,7 +104,7 @@ class RunFolder:
 
 def _write_json(path: Path, content: dict[str, Any]) -> None:
     text = json.dumps(content, indent=2, sort_keys=True)
-    write_atomically(path, lambda stream: stream.write(text.encode()))
+    write_atomically(path, text.encode())
 
 
 def _flatten(value: Any, prefix: str = "") -> dict[str, Any]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import os
 import zlib
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -12,11 +11,11 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from ngi.durable import PARTIAL_SUFFIX, write_atomically
 from ngi.reuse.compact import CompactPatches
 from ngi.reuse.store import PatchStore
 
 SEGMENT_PATTERN = "patches-*.pt"
-PARTIAL_SUFFIX = ".partial"
 SEGMENT_IDS = 2048  # at most, per file: 92 MB of 32 x 32 patches, held in memory twice
 
 
@@ -93,7 +92,7 @@ class PatchArchive:
         """Writes the patches of these ids, of first … last - 1, and describes the file."""
         name = f"patches-{first:012d}-{last:012d}.pt"
         compact = store.get_compact(ids)
-        _write_durably(self._folder / name, {"ids": ids, **compact.tensors()})
+        _write(self._folder / name, {"ids": ids, **compact.tensors()})
         return {"name": name, "first": first, "last": last, "checksum": _checksum(ids, compact)}
 
     def _read(self, state: dict[str, Any]) -> Iterator[tuple[Tensor, CompactPatches]]:
@@ -107,33 +106,12 @@ class PatchArchive:
             )
 
 
-def _write_durably(path: Path, content: dict[str, Tensor]) -> None:
-    """Writes the whole file or nothing; once it returns, the file survives a power cut."""
+def _write(path: Path, content: dict[str, Tensor]) -> None:
     # torch.save hides the OSError of a full disk behind an internal RuntimeError: go by memory.
     buffer = io.BytesIO()
     torch.save(content, buffer)
-    partial = path.with_name(path.name + PARTIAL_SUFFIX)
     path.parent.mkdir(parents=True, exist_ok=True)
-    try:
-        with partial.open("wb") as file:
-            file.write(buffer.getbuffer())
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(partial, path)
-    except OSError as error:
-        partial.unlink(missing_ok=True)
-        raise OSError(
-            error.errno,
-            f"{error.strerror}: patches could not be saved, earlier checkpoints are intact: see to "
-            "the disk's space and permissions, then start the same command again",
-            str(path),
-        ) from error
-    # The new name itself is on disk only once its folder is.
-    folder = os.open(path.parent, os.O_RDONLY)
-    try:
-        os.fsync(folder)
-    finally:
-        os.close(folder)
+    write_atomically(path, buffer.getbuffer())
 
 
 def _read_segment(path: Path, checksum: int) -> tuple[Tensor, CompactPatches]:

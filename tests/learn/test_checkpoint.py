@@ -20,9 +20,7 @@ def test_a_full_disk_leaves_the_old_checkpoint(
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(
-        OSError, match=r"last\.ckpt could not be written \(No space left.*Make room"
-    ):
+    with pytest.raises(OSError, match=r"No space left.*Make room.*last\.ckpt"):
         writer.save_checkpoint({"global_step": 2}, path)
     assert torch.load(path, weights_only=True)["global_step"] == 1
     assert [p.name for p in tmp_path.iterdir()] == ["last.ckpt"]
@@ -33,10 +31,8 @@ def test_a_log_on_a_full_disk_names_itself(tmp_path: Path) -> None:
     (tmp_path / "steps.csv").symlink_to("/dev/full")
     log = RowLog(tmp_path / "steps.csv")
     log.append({"step": 1})
-    with pytest.raises(
-        OSError, match=r"steps\.csv could not be written \(No space left.*Make room"
-    ):
+    with pytest.raises(OSError, match=r"No space left.*Make room.*steps\.csv"):
         log.flush()
-    with pytest.raises(OSError, match=r"steps\.csv could not be written"):
+    with pytest.raises(OSError, match=r"Make room.*steps\.csv"):
         log.close()
     log.close()  # once reported, it is over

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO
+
+PARTIAL_SUFFIX = ".partial"
+"""Of files that are being written; one that is left was cut short and means nothing."""
 
 
 @contextmanager
@@ -16,28 +18,30 @@ def full_disk_named(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise OSError(
-            f"{path} could not be written ({error.strerror or error}); earlier results are intact. "
-            "Make room, and the same command goes on from the last checkpoint"
+            error.errno,
+            f"{error.strerror}: this file could not be written, earlier checkpoints are intact. "
+            "Make room on the disk (or see to its permissions), then start the same command again",
+            str(path),
         ) from error
 
 
-def write_atomically(path: Path, write: Callable[[BinaryIO], object]) -> None:
+def write_atomically(path: Path, content: bytes | memoryview) -> None:
     """Replaces a file so that a crash at any time leaves either the old content or the new one.
 
-    write: gets the stream of a temporary file beside it
-    Raises OSError with what to do where the disk is full; the old file stays, no half file does.
+    Once it returns the file survives a power cut. Raises OSError with what to do where the disk
+    is full; the old file stays then, and no half file does.
     """
-    temporary = path.with_name(path.name + ".tmp")
+    partial = path.with_name(path.name + PARTIAL_SUFFIX)
     try:
         with full_disk_named(path):
-            with temporary.open("wb") as stream:
-                write(stream)
+            with partial.open("wb") as stream:
+                stream.write(content)
                 stream.flush()
                 os.fsync(stream.fileno())
-            temporary.replace(path)
+            os.replace(partial, path)
             _fsync_folder(path.parent)
     except OSError:
-        temporary.unlink(missing_ok=True)
+        partial.unlink(missing_ok=True)
         raise
 
 
