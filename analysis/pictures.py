@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,9 +37,9 @@ class _FrameOfMethods:
 
     @property
     def spread(self) -> float:
-        """How much the methods differ: largest MAPE minus smallest."""
-        values = [self.mape(method) for method in self.runs]
-        return max(values) - min(values)
+        """How much the methods differ: largest finite MAPE minus smallest; 0 without any."""
+        values = [value for value in map(self.mape, self.runs) if math.isfinite(value)]
+        return max(values) - min(values) if values else 0.0
 
 
 def write_comparisons(runs: Sequence[Run], folder: Path) -> tuple[list[Path], list[str]]:

@@ -12,7 +12,7 @@ from analysis.latex import to_latex
 from analysis.methods import differing_fields, methods_in_order, name_methods
 from analysis.pictures import write_comparisons
 from analysis.plots import method_styles, write_error_curves
-from analysis.runs import SETS, Run, check_comparable, find_runs
+from analysis.runs import SETS, Run, check_comparable, comparison_warnings, find_runs
 from analysis.summary import REFERENCE_NOISE, Comparison, Summary, compare, summarise, to_frame
 from analysis.tables import (
     Table,
@@ -43,19 +43,22 @@ def write_report(folder: Path, output: Path) -> Report:
     runs, warnings = find_runs(folder)
     runs = name_methods(runs)
     check_comparable(runs)
+    doubts = comparison_warnings(runs)
     summaries = summarise(runs)
     comparisons = compare(summaries)
     output.mkdir(parents=True, exist_ok=True)
-    files = _write_tables(runs, summaries, comparisons, output)
+    files = _write_tables(runs, summaries, comparisons, doubts, output)
     files += write_error_curves(runs, method_styles(runs), output)
     overviews, missing = write_comparisons(runs, output / "pictures")
-    return Report(_text(runs, summaries, comparisons), files + overviews, warnings + missing)
+    text = _text(runs, summaries, comparisons)
+    return Report(text, files + overviews, [*warnings, *doubts, *missing])
 
 
 def _write_tables(
     runs: Sequence[Run],
     summaries: Sequence[Summary],
     comparisons: Sequence[Comparison],
+    doubts: Sequence[str],
     output: Path,
 ) -> list[Path]:
     tables = [error_table(summaries), worst_table(summaries), cost_table(summaries)]
@@ -63,7 +66,8 @@ def _write_tables(
         tables.append(comparison_table(comparisons))
     csv, markdown, latex = (output / f"results.{suffix}" for suffix in ("csv", "md", "tex"))
     to_frame(summaries).to_csv(csv, index=False)
-    notes = "\n".join(f"- {note}" for note in _notes(runs))
+    lines = [*_notes(runs), *(f"Warning: {doubt}" for doubt in doubts)]
+    notes = "\n".join(f"- {line}" for line in lines)
     markdown.write_text("\n\n".join([*map(to_markdown, tables), notes]) + "\n")
     latex.write_text("\n\n".join(map(to_latex, tables)) + "\n")
     return [csv, markdown, latex]
@@ -90,7 +94,8 @@ def _notes(runs: Sequence[Run]) -> list[str]:
         "lowest mean is marked.",
         "±: half width of the 95 % interval of the mean over n seeds (Student's t); "
         "none for one seed.",
-        f"{REFERENCE_NOISE}: what a perfect prediction would score against these references.",
+        f"{REFERENCE_NOISE}: what a perfect prediction would score against these references; for "
+        "DSSIM and LPIPS a lower bound, right in order of magnitude.",
     ]
     fields = differing_fields(runs)
     for method in methods_in_order(runs):

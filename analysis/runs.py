@@ -16,6 +16,9 @@ SCHEMA_VERSION = 1
 SETS = ("hard", "uniform")
 METRICS = ("mape", "dssim", "mae", "lpips")
 
+MOST_TIME_APART = 0.05
+"""Relative difference of run times up to which runs count as given the same time."""
+
 DISTINCTIONS = ("reuse", "resolution", "model", "loss", "budget", "overrides", "experiment")
 """Label fields that tell methods of one sampler apart, the most telling first."""
 
@@ -148,6 +151,34 @@ def check_comparable(runs: Sequence[Run]) -> None:
                 f"{other.folder} and {run.folder} are the same method ({run.method}) with the "
                 f"same seed ({run.seed}); move one of them out of the folder"
             )
+
+
+def comparison_warnings(runs: Sequence[Run]) -> list[str]:
+    """What makes a comparison doubtful without forbidding it, a line each.
+
+    Runs of one scene whose run times are more than 5 % apart, and runs of different machines.
+    """
+    warnings = []
+    for scene in sorted({run.scene for run in runs}):
+        times = {run.folder: run.result["run_seconds"] for run in runs if run.scene == scene}
+        shortest, longest = min(times, key=times.__getitem__), max(times, key=times.__getitem__)
+        if times[longest] > (1 + MOST_TIME_APART) * times[shortest]:
+            warnings.append(
+                f"{scene}: the runs were not given the same time: {times[shortest]:.0f} s in "
+                f"{shortest}, {times[longest]:.0f} s in {longest}"
+            )
+    machines: dict[str, Path] = {}
+    for run in runs:
+        machines.setdefault(_machine(run), run.folder)
+    if len(machines) > 1:
+        found = "; ".join(f"{machine} in {folder}" for machine, folder in machines.items())
+        warnings.append(f"the runs come from different machines: {found}")
+    return warnings
+
+
+def _machine(run: Run) -> str:
+    machine = run.result.get("machine", {})
+    return f"{machine.get('processor')}, {machine.get('backend')}"
 
 
 def _require_equal(runs: Sequence[Run], what: str, value: Callable[[Run], str]) -> None:

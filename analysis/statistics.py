@@ -42,9 +42,13 @@ def paired_difference(baseline: Mapping[int, float], other: Mapping[int, float])
     """Relative difference (other - baseline) / baseline over the seeds both have.
 
     Maps a seed to its value. Pairing takes out what the seed alone does to both. None where no
-    seed is shared.
+    seed is shared, a mean of NaN where a baseline is 0.
     """
     seeds = sorted(baseline.keys() & other.keys())
     if not seeds:
         return None
-    return estimate([(other[seed] - baseline[seed]) / baseline[seed] for seed in seeds])
+    return estimate([_relative_difference(baseline[seed], other[seed]) for seed in seeds])
+
+
+def _relative_difference(baseline: float, other: float) -> float:
+    return math.nan if baseline == 0 else (other - baseline) / baseline

@@ -88,23 +88,25 @@ class Comparison:
 
 
 def compare(summaries: Sequence[Summary]) -> list[Comparison]:
-    """A comparison for every scene that was run with exactly two methods."""
+    """Every method of a scene against its baseline: the first uniform sampling, else the first."""
     comparisons = []
     for scene in dict.fromkeys(summary.scene for summary in summaries):
-        pair = [summary for summary in summaries if summary.scene == scene and summary.is_method]
-        if len(pair) != 2:
-            continue
-        pair.sort(key=lambda summary: not is_baseline(summary.method))
-        differences = {
-            f"{set_name}_{metric}": paired_difference(
-                *(_by_seed(summary.runs, set_name, metric) for summary in pair)
-            )
-            for set_name in SETS
-            for metric in METRICS
-        }
-        if any(differences.values()):
-            comparisons.append(Comparison(scene, pair[0].method, pair[1].method, differences))
+        methods = [summary for summary in summaries if summary.scene == scene and summary.is_method]
+        baseline, *others = sorted(methods, key=lambda summary: not is_baseline(summary.method))
+        compared = (_compare(baseline, other) for other in others)
+        comparisons += [found for found in compared if any(found.differences.values())]
     return comparisons
+
+
+def _compare(baseline: Summary, other: Summary) -> Comparison:
+    differences = {
+        f"{set_name}_{metric}": paired_difference(
+            _by_seed(baseline.runs, set_name, metric), _by_seed(other.runs, set_name, metric)
+        )
+        for set_name in SETS
+        for metric in METRICS
+    }
+    return Comparison(baseline.scene, baseline.method, other.method, differences)
 
 
 def _by_seed(runs: Sequence[Run], set_name: str, metric: str) -> dict[int, float]:

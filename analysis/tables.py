@@ -100,9 +100,12 @@ def _table(
 
 
 def _is_best(value: Estimate | None, key: str, rivals: Sequence[Summary]) -> bool:
+    """Whether it is the lowest finite mean; a rival whose mean is NaN or Inf is beaten."""
     others = [rival.values[key] for rival in rivals]
     means = [other.mean for other in others if other is not None]
-    return value is not None and len(means) > 1 and value.mean == min(means)
+    if value is None or len(means) < 2 or not math.isfinite(value.mean):
+        return False
+    return value.mean == min(filter(math.isfinite, means))
 
 
 def format_number(value: float, decimals: int | None = None) -> str:
@@ -121,8 +124,8 @@ def format_estimate(value: Estimate) -> str:
 
 
 def _percent_or_missing(value: Estimate | None) -> str:
-    """'-12.3 ± 4.5 %'."""
-    if value is None:
+    """'-12.3 ± 4.5 %'; missing too where it is undefined, for a baseline of 0."""
+    if value is None or math.isnan(value.mean):
         return MISSING
     interval = "" if value.half_width is None else f" ± {100 * value.half_width:.1f}"
     return f"{100 * value.mean:+.1f}{interval} %"

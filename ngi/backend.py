@@ -63,7 +63,14 @@ def activate(backend: str = "auto") -> str:
 
 def describe(variant: str) -> str:
     """One line for logs and result files: Mitsuba's version, the variant and what it runs on."""
-    runs_on = f", {_llvm}" if variant == VARIANTS["llvm"] else ""
+    runs_on = ""
+    if variant == VARIANTS["llvm"]:
+        runs_on = f", {_llvm}"
+    elif variant == VARIANTS["cuda"]:
+        import torch  # slow to import, and only needed for the name
+
+        if torch.cuda.is_available():
+            runs_on = f", {torch.cuda.get_device_name()}"
     return f"Mitsuba {mi.__version__}, {variant}{runs_on}"
 
 

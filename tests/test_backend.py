@@ -1,6 +1,7 @@
 import logging
 
 import pytest
+import torch
 
 from ngi import backend
 
@@ -37,3 +38,12 @@ def test_auto_takes_llvm_before_scalar(monkeypatch) -> None:
         pytest.skip(problem)
     assert backend.activate("auto") == "llvm_ad_rgb"
     assert "LLVM" in backend.describe("llvm_ad_rgb")
+
+
+def test_cuda_is_described_with_its_gpu_where_torch_sees_it(monkeypatch) -> None:
+    monkeypatch.setattr(torch.cuda, "get_device_name", lambda: "Some GPU")
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
+    assert backend.describe("cuda_ad_rgb").endswith("cuda_ad_rgb, Some GPU")
+    assert "Some GPU" not in backend.describe("scalar_rgb")
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
+    assert backend.describe("cuda_ad_rgb").endswith("cuda_ad_rgb")

@@ -13,6 +13,7 @@ from torch import Tensor
 from ngi.evaluate.frames import Frame
 from ngi.evaluate.pictures import write_pictures
 from ngi.evaluate.protocol import METRICS, SETS, EvaluationProtocol
+from ngi.evaluate.reference import Reference
 
 WORST_OF = 20
 """The worst 5 %, one frame of 20, are averaged on their own."""
@@ -56,8 +57,10 @@ class Evaluation:
 
     frames: the test frames
     metrics: their metrics, in the same order
-    floors: what a perfect prediction would score for the references' own noise, in the same order
-    predictions, references: [H, W, 3] linear radiance, in the same order
+    floors: what a perfect prediction would score for the references' own noise, in the same order;
+        of DSSIM and LPIPS a lower bound, see `Reference.radiance`
+    predictions: [H, W, 3] linear radiance, in the same order
+    references: the reference images, in the same order
     reference_hash: hash over all references
     lpips_note: why there is no LPIPS, or None
     """
@@ -67,7 +70,7 @@ class Evaluation:
     metrics: tuple[FrameMetrics, ...]
     floors: tuple[FrameMetrics, ...]
     predictions: tuple[Tensor, ...]
-    references: tuple[Tensor, ...]
+    references: tuple[Reference, ...]
     reference_hash: str
     lpips_note: str | None
 
@@ -91,7 +94,8 @@ class Evaluation:
         """This evaluation's part of result.json: plain JSON data.
 
         protocol: {name, identity}; reference_hash; metrics: {set: {metric: {mean, worst5, floor}
-        or null}}; non_finite: {set: pixels}; frames: one dict per frame; lpips_note.
+        or null}}; non_finite: {set: pixels}; frames: per frame its metrics and its reference's
+        noise and samples per pixel; lpips_note.
         """
         return {
             "protocol": {"name": self.protocol.name, "identity": self.protocol.identity},
@@ -101,7 +105,14 @@ class Evaluation:
                 for set_name in SETS
             },
             "non_finite": {set_name: self.row()[f"{set_name}_non_finite"] for set_name in SETS},
-            "frames": [asdict(frame) for frame in self.metrics],
+            "frames": [
+                {
+                    **asdict(frame),
+                    "reference_noise": reference.noise,
+                    "reference_samples_per_pixel": reference.samples_per_pixel,
+                }
+                for frame, reference in zip(self.metrics, self.references, strict=True)
+            ],
             "lpips_note": self.lpips_note,
         }
 
@@ -121,7 +132,7 @@ class Evaluation:
                 folder,
                 f"{frame.set}_{frame.index:02d}",
                 prediction=prediction,
-                reference=reference,
+                reference=reference.radiance,
                 epsilon=self.protocol.epsilon,
                 exposure=self.protocol.exposure,
                 mape=metrics.mape,

@@ -16,6 +16,7 @@ from ngi.evaluate.frames import Frame, evaluation_frames
 from ngi.evaluate.lpips_metric import Lpips
 from ngi.evaluate.metrics import dssim, mae, mape, non_finite_pixels, tone_map
 from ngi.evaluate.protocol import EvaluationProtocol
+from ngi.evaluate.reference import Reference
 from ngi.evaluate.references import ReferenceCache
 from ngi.render.protocol import Renderer
 
@@ -29,7 +30,7 @@ Predict = Callable[[Tensor, Tensor], Tensor]
 class _PreparedFrame:
     frame: Frame
     buffers: Tensor
-    reference: Tensor
+    reference: Reference
     floor: FrameMetrics
 
 
@@ -37,7 +38,7 @@ class Evaluator:
     """Measures predictions of one scene's images.
 
     The references are rendered, or read from the cache, by `prepare`, at the latest by the first
-    evaluation.
+    evaluation; the buffers, which are never cached, come from the present renderer.
     """
 
     def __init__(
@@ -57,7 +58,7 @@ class Evaluator:
         self._reference_hash = ""
 
     def prepare(self) -> None:
-        """Renders the references that are not cached yet, with a progress bar."""
+        """Renders the frames' buffers and the references not cached yet, with a progress bar."""
         if self._prepared:
             return
         digest = hashlib.sha256()
@@ -85,8 +86,8 @@ class Evaluator:
                 prepared.append(
                     _PreparedFrame(
                         frame=frame,
-                        buffers=reference.buffers,
-                        reference=reference.radiance,
+                        buffers=self._buffers(frame),
+                        reference=reference,
                         floor=self._measure(frame, reference.half_a, reference.radiance),
                     )
                 )
@@ -105,7 +106,7 @@ class Evaluator:
             protocol=self.protocol,
             frames=self._frames,
             metrics=tuple(
-                self._measure(prepared.frame, prediction, prepared.reference)
+                self._measure(prepared.frame, prediction, prepared.reference.radiance)
                 for prepared, prediction in zip(self._prepared, predictions, strict=True)
             ),
             floors=tuple(prepared.floor for prepared in self._prepared),
@@ -114,6 +115,13 @@ class Evaluator:
             reference_hash=self._reference_hash,
             lpips_note=self._lpips.reason,
         )
+
+    def _buffers(self, frame: Frame) -> Tensor:
+        """[H, W, C] float32 on the CPU."""
+        buffers = self._renderer.image_buffers(
+            frame.scene_vector, resolution=self.protocol.resolution
+        )
+        return buffers.detach().cpu().float()
 
     def _measure(self, frame: Frame, prediction: Tensor, reference: Tensor) -> FrameMetrics:
         """prediction, reference: [H, W, 3] linear radiance."""
@@ -135,9 +143,9 @@ def _radiance(predict: Predict, prepared: _PreparedFrame) -> Tensor:
     """[H, W, 3] float32 linear radiance on the CPU; negative values stay as they are."""
     with torch.no_grad():
         log_radiance = predict(prepared.buffers, prepared.frame.scene_vector)
-    if log_radiance.shape != prepared.reference.shape:
+    expected = prepared.reference.half_a.shape
+    if log_radiance.shape != expected:
         raise ValueError(
-            f"prediction of shape {list(log_radiance.shape)}, "
-            f"expected {list(prepared.reference.shape)}"
+            f"prediction of shape {list(log_radiance.shape)}, expected {list(expected)}"
         )
     return torch.expm1(log_radiance.detach().cpu().float())

@@ -23,7 +23,6 @@ class Reference:
     """A reference image in two independent halves.
 
     key: content hash, also the cache file's name
-    buffers: [H, W, C] float32, at the samples per pixel of one pass
     half_a, half_b: [H, W, 3] float32, linear RGB radiance, each from half of the samples
     samples_per_pixel: of both halves together
     noise: mean relative standard error of `radiance`, see `relative_noise`
@@ -31,7 +30,6 @@ class Reference:
     """
 
     key: str
-    buffers: Tensor
     half_a: Tensor
     half_b: Tensor
     samples_per_pixel: int
@@ -43,15 +41,19 @@ class Reference:
         """[H, W, 3] linear RGB, the mean of the halves.
 
         Its error has the distribution of (half_a - half_b) / 2 = half_a - radiance, so
-        metric(half_a, radiance) is what a perfect prediction would score: the metric's floor.
+        metric(half_a, radiance) is what a perfect prediction would score: the metric's floor. That
+        holds for MAPE and MAE. For DSSIM and LPIPS it holds in order of magnitude only and is a
+        lower bound, since they also see that half_a, unlike the truth, is noisy itself: where noise
+        of variance s in the mean lies on a smooth picture, twice the DSSIM is s / (s + C2) for the
+        truth and s / (3 s + C2) for half_a, which has twice that variance.
         """
         return 0.5 * (self.half_a + self.half_b)
 
     @property
     def content_hash(self) -> str:
-        """Hash of what predictions see and are compared with: buffers and radiance."""
+        """Hash of what predictions are compared with: the radiance of both halves."""
         digest = hashlib.sha256()
-        for tensor in (self.buffers, self.half_a, self.half_b):
+        for tensor in (self.half_a, self.half_b):
             digest.update(tensor.contiguous().numpy().tobytes())
         return digest.hexdigest()
 
@@ -76,7 +78,6 @@ def write_reference(path: Path, reference: Reference) -> None:
             np.savez_compressed(
                 stream,
                 key=np.array(reference.key),
-                buffers=reference.buffers.numpy(),
                 half_a=reference.half_a.numpy(),
                 half_b=reference.half_b.numpy(),
                 samples_per_pixel=np.array(reference.samples_per_pixel),
@@ -96,7 +97,6 @@ def read_reference(path: Path, *, resolution: int) -> Reference:
     with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
         reference = Reference(
             key=str(file["key"]),
-            buffers=torch.from_numpy(file["buffers"]),
             half_a=torch.from_numpy(file["half_a"]),
             half_b=torch.from_numpy(file["half_b"]),
             samples_per_pixel=int(file["samples_per_pixel"]),

@@ -23,8 +23,9 @@ from ngi.render.protocol import Renderer
 
 log = logging.getLogger(__name__)
 
-FORMAT_VERSION = 1
-"""Of the cache files; part of their names, so an old file is never misread."""
+FORMAT_VERSION = 2
+"""Of the cache files and how they are rendered; part of their names, so that an old file is never
+misread."""
 
 PassDone = Callable[[int, float], None]
 """Called after every pass with the samples per pixel so far and the noise measured then."""
@@ -95,20 +96,18 @@ def _render(
     total = torch.zeros(2, *shape, dtype=torch.float64)
     # NaN and Inf pixels of a pass are left out of the mean, pixel by pixel.
     passes = torch.zeros(2, *shape[:2], 1, dtype=torch.float64)
-    buffers = None
     for step in range(protocol.maximum_samples // (2 * protocol.samples_per_pass)):
         for half in range(2):
-            image = renderer.render_image(
+            radiance = renderer.render_image(
                 scene_vector,
                 resolution=protocol.resolution,
                 samples_per_pixel=protocol.samples_per_pass,
                 seed=_seed(key, half, step),
             )
-            radiance = image.radiance.detach().cpu().double()
+            radiance = radiance.detach().cpu().double()
             finite = radiance.isfinite().all(dim=-1, keepdim=True)
             total[half] += torch.where(finite, radiance, 0.0)
             passes[half] += finite
-            buffers = image.buffers.detach().cpu().float() if buffers is None else buffers
         half_a, half_b = (total / passes).float()
         noise = relative_noise(half_a, half_b, protocol.epsilon)
         samples = 2 * protocol.samples_per_pass * (step + 1)
@@ -116,11 +115,10 @@ def _render(
             on_pass(samples, noise)
         if noise <= protocol.target_noise:
             break
-    assert buffers is not None
     missing = int((passes == 0).sum())
     if missing:
         raise RuntimeError(
             f"reference {key}: {missing} pixels were NaN or Inf in every pass of "
             f"{protocol.samples_per_pass} samples; v = {scene_vector.tolist()}"
         )
-    return Reference(key, buffers, half_a, half_b, samples, noise, renderer.description)
+    return Reference(key, half_a, half_b, samples, noise, renderer.description)

@@ -62,6 +62,7 @@ class WeightsAndBiases:
             name="/".join(str(label[key]) for key in ("scene", "sampler", "seed")),
             tags=[f"{key}={label[key]}" for key in ("scene", "sampler", "seed")],
             reinit="finish_previous",
+            settings=wandb.Settings(quiet=True),
         )
 
     def log(self, row: Mapping[str, object]) -> None:
@@ -69,5 +70,5 @@ class WeightsAndBiases:
 
     def finish(self, *, failed: bool) -> None:
         if self._run is not None:
-            self._run.finish(exit_code=int(failed), quiet=True)
+            self._run.finish(exit_code=int(failed))
             self._run = None

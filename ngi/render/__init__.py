@@ -5,6 +5,6 @@ here does not.
 """
 
 from ngi.render.analytic import AnalyticRenderer
-from ngi.render.protocol import RenderedImage, RenderedPatches, Renderer
+from ngi.render.protocol import RenderedPatches, Renderer
 
-__all__ = ["AnalyticRenderer", "RenderedImage", "RenderedPatches", "Renderer"]
+__all__ = ["AnalyticRenderer", "RenderedPatches", "Renderer"]

@@ -9,9 +9,12 @@ import torch
 from torch import Tensor
 
 from ngi.patches import BufferLayout
-from ngi.render.protocol import RenderedImage, RenderedPatches
+from ngi.render.protocol import RenderedPatches
 from ngi.render.render_inputs import check_states, patch_window, require_positive
 from ngi.render.tracing import Window, derive_seed
+
+FORMULA_VERSION = 1
+"""Counts changes of what the formulas give; part of the scene's hash."""
 
 HARD_FRAMES = 10
 GOLDEN_RATIO = (1 + sqrt(5)) / 2
@@ -56,7 +59,8 @@ class AnalyticRenderer:
         self.patch_size = patch_size
         self.samples_per_pixel = samples_per_pixel
         self.noise = noise
-        self.scene_hash = sha256(f"analytic {dimensions} {self.layout.names}".encode()).hexdigest()
+        content = ("analytic", FORMULA_VERSION, dimensions, float(noise), self.layout.names)
+        self.scene_hash = sha256(repr(content).encode()).hexdigest()
         self.description = "closed formulas, PyTorch"
         # Irrational weights in [0.5, 1.5): every quantity depends on every variable, differently.
         quantity, variable = torch.arange(1.0, 8)[:, None], torch.arange(1.0, dimensions + 1)
@@ -86,21 +90,27 @@ class AnalyticRenderer:
 
     def render_image(
         self, scene_vector: Tensor, *, resolution: int, samples_per_pixel: int, seed: int
-    ) -> RenderedImage:
+    ) -> Tensor:
         """See `ngi.render.Renderer.render_image`."""
-        require_positive(resolution=resolution, samples_per_pixel=samples_per_pixel)
-        position = scene_vector.new_zeros(2)
-        check_states(torch.cat([scene_vector, position])[None], self.dimensions)
-        window = Window(0, 0, resolution, resolution, resolution)
-        buffers, clean = self._evaluate(scene_vector, window)
+        require_positive(samples_per_pixel=samples_per_pixel)
+        _, clean = self._whole_image(scene_vector, resolution)
         number = derive_seed(seed, scene_vector.numpy().tobytes(), resolution)
-        radiance = self._add_noise(clean, samples_per_pixel, number)
-        return RenderedImage(buffers=buffers, radiance=radiance)
+        return self._add_noise(clean, samples_per_pixel, number)
+
+    def image_buffers(self, scene_vector: Tensor, *, resolution: int) -> Tensor:
+        """See `ngi.render.Renderer.image_buffers`."""
+        buffers, _ = self._whole_image(scene_vector, resolution)
+        return buffers
 
     def hard_frames(self) -> Tensor:
         """[10, D]: fixed points spread over the unit hypercube."""
         index = torch.arange(1.0, HARD_FRAMES + 1)[:, None]
         return torch.frac(index * torch.arange(1.0, self.dimensions + 1) * GOLDEN_RATIO)
+
+    def _whole_image(self, v: Tensor, resolution: int) -> tuple[Tensor, Tensor]:
+        require_positive(resolution=resolution)
+        check_states(torch.cat([v, v.new_zeros(2)])[None], self.dimensions)
+        return self._evaluate(v, Window(0, 0, resolution, resolution, resolution))
 
     def _evaluate(self, v: Tensor, window: Window) -> tuple[Tensor, Tensor]:
         """Buffers [h, w, C] and noise-free radiance [h, w, 3]."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,7 @@ from torch import Tensor
 from ngi.backend import activate, describe, mi
 from ngi.render.first_hit import first_hit_of
 from ngi.render.jit_tracer import JitTracer
-from ngi.render.protocol import RenderedImage, RenderedPatches
+from ngi.render.protocol import RenderedPatches
 from ngi.render.render_inputs import check_states, patch_window, require_positive
 from ngi.render.scalar_tracer import ScalarTracer
 from ngi.render.tracing import Pending, Tracer, Window, derive_seed
@@ -28,8 +27,6 @@ SAMPLES_PER_PASS = 256
 
 BUFFER_SAMPLES = {"cuda_ad_rgb": 16, "llvm_ad_rgb": 16, "scalar_rgb": 2}
 """Samples per pixel of the buffers by default; a Python loop takes them in the scalar variant."""
-
-_logger = logging.getLogger(__name__)
 
 
 class MitsubaRenderer:
@@ -68,6 +65,7 @@ class MitsubaRenderer:
         self._require_square_film()
         first_hit = first_hit_of(self._scene)
         buffer_samples = buffer_samples or BUFFER_SAMPLES[self._variant]
+        self._buffer_samples = buffer_samples
         loaded = self._scene.scene
         self._patch_tracer: Tracer
         self._image_tracer: Tracer
@@ -127,29 +125,35 @@ class MitsubaRenderer:
 
     def render_image(
         self, scene_vector: Tensor, *, resolution: int, samples_per_pixel: int, seed: int
-    ) -> RenderedImage:
+    ) -> Tensor:
         """See `ngi.render.Renderer.render_image`; memory does not grow with the samples.
 
         Bands of rows are rendered in passes of at most `SAMPLES_PER_PASS`, summed in double
-        precision. A pass with NaN or Inf is rendered again, then masked, with a warning.
+        precision.
         """
         require_positive(resolution=resolution, samples_per_pixel=samples_per_pixel)
         mi.set_variant(self._variant)
         self._scene.apply(scene_vector)
         state = np.asarray(scene_vector, dtype=np.float32).tobytes()
-        radiance, buffers = [], []
+        bands = []
         for band in _bands(resolution, min(samples_per_pixel, SAMPLES_PER_PASS)):
             total = np.zeros((band.height, resolution, 3))
             for start in range(0, samples_per_pixel, SAMPLES_PER_PASS):
                 samples = min(SAMPLES_PER_PASS, samples_per_pixel - start)
-                place = (seed, state, resolution, band.y, start)
-                total += samples * self._radiance_pass(band, samples, place).astype(np.float64)
-            radiance.append(total / samples_per_pixel)
-            buffers.append(_masked(self._image_tracer.buffers(band)()))
-        return RenderedImage(
-            buffers=self._encode(torch.from_numpy(np.concatenate(buffers))),
-            radiance=torch.from_numpy(np.concatenate(radiance).astype(np.float32)),
-        )
+                number = derive_seed(seed, state, resolution, band.y, start)
+                radiance = self._image_tracer.radiance(band, samples=samples, seed=number)()
+                total += samples * radiance.astype(np.float64)
+            bands.append(total / samples_per_pixel)
+        return torch.from_numpy(np.concatenate(bands).astype(np.float32))
+
+    def image_buffers(self, scene_vector: Tensor, *, resolution: int) -> Tensor:
+        """See `ngi.render.Renderer.image_buffers`; the same as a patch's at the same pixels."""
+        require_positive(resolution=resolution)
+        mi.set_variant(self._variant)
+        self._scene.apply(scene_vector)
+        bands = _bands(resolution, self._buffer_samples)
+        buffers = np.concatenate([_masked(self._image_tracer.buffers(band)()) for band in bands])
+        return self._encode(torch.from_numpy(buffers))
 
     def hard_frames(self) -> Tensor:
         """[10, D]: the scene's hard test frames (paper, Sec. 7.2.1)."""
@@ -163,17 +167,6 @@ class MitsubaRenderer:
         number = derive_seed(seed, state.numpy().tobytes(), resolution, attempt)
         radiance = self._patch_tracer.radiance(window, samples=self.samples_per_pixel, seed=number)
         return radiance, self._patch_tracer.buffers(window)
-
-    def _radiance_pass(
-        self, band: Window, samples: int, place: tuple[int | bytes, ...]
-    ) -> NDArray[np.float32]:
-        for attempt in range(2):
-            number = derive_seed(*place, attempt)
-            radiance = self._image_tracer.radiance(band, samples=samples, seed=number)()
-            if _finite(radiance):
-                return radiance
-        _logger.warning("an image's rows from %d hold NaN or Inf, which were set to zero", band.y)
-        return _masked(radiance)
 
     def _encode(self, buffers: Tensor) -> Tensor:
         """Emission becomes log1p of its mean, in place."""

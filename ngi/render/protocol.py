@@ -26,14 +26,6 @@ class RenderedPatches:
     paths: int
 
 
-@dataclass(frozen=True)
-class RenderedImage:
-    """buffers: [H, W, C] float32; radiance: [H, W, 3] float32, linear RGB."""
-
-    buffers: Tensor
-    radiance: Tensor
-
-
 class Renderer(Protocol):
     """Renders a variable scene: scene vector, patch and resolution in, buffers and radiance out."""
 
@@ -66,8 +58,19 @@ class Renderer(Protocol):
 
     def render_image(
         self, scene_vector: Tensor, *, resolution: int, samples_per_pixel: int, seed: int
-    ) -> RenderedImage:
-        """Renders a whole image of resolution x resolution pixels for one v of shape [D]."""
+    ) -> Tensor:
+        """[H, W, 3] float32, linear RGB: radiance of resolution x resolution pixels for a v [D].
+
+        Pixels that a path made NaN or Inf stay so, unlike those of a patch: a mean over several
+        images must leave them out, and a zero in their place would darken it.
+        """
+        ...
+
+    def image_buffers(self, scene_vector: Tensor, *, resolution: int) -> Tensor:
+        """[H, W, C] float32: the first-hit buffers of the same pixels, as `layout` names them.
+
+        Without noise, so there is no seed. A pixel with NaN or Inf is zero in all channels.
+        """
         ...
 
     def hard_frames(self) -> Tensor:

@@ -14,7 +14,8 @@ class ScalarTracer:
     """The `ngi.render.tracing.Tracer` of scalar_rgb.
 
     Radiance is Mitsuba's own compiled rendering loop over the crop window of a box-filtered copy
-    of the scene's camera; the buffers are a Python loop over pixels, so that few samples pay.
+    of the scene's camera, which follows where that one stands and how wide it looks; the buffers
+    are a Python loop over pixels, so that few samples pay.
     """
 
     def __init__(self, *, scene: mi.Scene, first_hit: FirstHit, buffer_samples: int) -> None:
@@ -22,16 +23,19 @@ class ScalarTracer:
         self._first_hit = first_hit
         self._points = subpixel_points(buffer_samples)
         self._sensor = _box_filtered_copy(scene.sensors()[0])
-        self._film = mi.traverse(self._sensor)
+        self._copy = mi.traverse(self._sensor)
 
     def radiance(self, window: Window, *, samples: int, seed: int) -> Pending:
         # A film given a new size takes all of it as its crop window, but keeps the old offset.
-        self._film["film.size"] = [window.resolution, window.resolution]
-        self._film["film.crop_offset"] = [0, 0]
-        self._film.update()
-        self._film["film.crop_size"] = [window.width, window.height]
-        self._film["film.crop_offset"] = [window.x, window.y]
-        self._film.update()
+        self._copy["film.size"] = [window.resolution, window.resolution]
+        self._copy["film.crop_offset"] = [0, 0]
+        self._copy.update()
+        self._copy["film.crop_size"] = [window.width, window.height]
+        self._copy["film.crop_offset"] = [window.x, window.y]
+        camera = mi.traverse(self._scene.sensors()[0])
+        for key in ("to_world", "x_fov"):
+            self._copy[key] = camera[key]
+        self._copy.update()
         image = mi.render(self._scene, sensor=self._sensor, seed=seed, spp=samples)
         result = np.array(image, dtype=np.float32)
         return lambda: result

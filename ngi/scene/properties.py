@@ -77,6 +77,11 @@ class Albedo(Property):
             ),
             hint="name a BSDF whose reflectance is given as <rgb>, not as a texture",
         )
+        if (count := parameters.read(key).size) != 3:
+            raise ValueError(
+                f"scene.xml: albedo of '{object_id}': {key} holds {count} number(s) instead of 3; "
+                "give the reflectance as <rgb>, not as <spectrum>"
+            )
         return lambda value: parameters.write(key, value)
 
 

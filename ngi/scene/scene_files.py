@@ -68,8 +68,8 @@ def _file_names(scene: SceneFile) -> Iterator[tuple[str, str]]:
 def integrator_max_depth(scene: SceneFile) -> int:
     """The authored max_depth; Mitsuba's default, -1 for no limit, where none is given.
 
-    Raises ValueError for a scene without integrator and for one that hides emitters: the picture
-    and the emission buffer must both show them.
+    Raises ValueError for a scene without integrator, for a max_depth that is no integer, and for a
+    scene that hides emitters: the picture and the emission buffer must both show them.
     """
     integrator = scene.root.find("integrator")
     if integrator is None:
@@ -78,7 +78,16 @@ def integrator_max_depth(scene: SceneFile) -> int:
     if hidden is not None and scene.value(hidden) == "true":
         raise ValueError(f"{scene.path}: hide_emitters is true, set it to false: emitters show")
     depth = integrator.find("integer[@name='max_depth']")
-    return -1 if depth is None else int(scene.value(depth))
+    if depth is None:
+        return -1
+    value = scene.value(depth)
+    try:
+        return int(value)
+    except ValueError:
+        raise ValueError(
+            f"{scene.path}: the integrator's max_depth is '{value}'; expected an integer, the one "
+            "in scene.yaml"
+        ) from None
 
 
 def content_hash(contents: list[tuple[str, Path]]) -> str:

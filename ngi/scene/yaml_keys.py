@@ -9,17 +9,40 @@ from pathlib import Path
 from typing import Any
 
 import yaml
+from yaml.composer import ComposerError
 
 Vector = tuple[float, ...]
 
 
+class _UniqueKeyLoader(yaml.SafeLoader):
+    """YAML's safe loader; of a key that is there twice, that one would silently take the last."""
+
+    def compose_mapping_node(self, anchor: Any) -> yaml.MappingNode:
+        node: yaml.MappingNode = super().compose_mapping_node(anchor)
+        seen: set[str] = set()
+        for key in (key for key, _ in node.value if isinstance(key, yaml.ScalarNode)):
+            if key.value in seen:
+                problem = f"the key '{key.value}' is there twice; keep one of them"
+                raise ComposerError(problem=problem, problem_mark=key.start_mark)
+            seen.add(key.value)
+        return node
+
+
 def load_yaml(path: Path) -> dict[str, Any]:
-    """Raises ValueError, naming the line, where the YAML is broken."""
+    """The file's mapping.
+
+    Raises ValueError, naming the file and where possible the line, for broken YAML, a key that is
+    there twice and text that is not UTF-8.
+    """
     try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+        content = yaml.load(path.read_text(encoding="utf-8"), Loader=_UniqueKeyLoader)
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else "?"
         raise ValueError(f"{path}, line {line}: broken YAML: {error.problem}") from None
+    except yaml.YAMLError as error:
+        raise ValueError(f"{path}: broken YAML: {' '.join(str(error).split())}") from None
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{path}: not UTF-8 ({error}); save it in that encoding") from None
     if not isinstance(content, dict):
         raise ValueError(f"{path}: expected keys and values, got {type(content).__name__}")
     return content

@@ -88,6 +88,52 @@ def test_overview_shows_where_methods_differ_most(one_scene, tmp_path) -> None:
     assert np.array_equal(first, expected)  # the fixture's frame 3 has the largest spread
 
 
+def test_errors_that_are_not_finite_do_not_hide_where_methods_differ(make_run, tmp_path) -> None:
+    def diverge(result: dict) -> None:
+        for frame in result["frames"]:
+            if frame["index"] in (0, 1):
+                frame["mape"] = float("nan")
+
+    make_run(change=diverge)
+    make_run(sampler="mcmc_loss")
+    make_run(sampler="mcmc_loss_step", quality=1.3)
+    assert main([str(tmp_path / "runs"), "--output", str(tmp_path)]) == 0
+    with Image.open(tmp_path / "pictures" / "mirror.png") as overview:
+        first = np.asarray(overview.crop((0, 0, overview.width, 256 + 32)))
+    with Image.open(tmp_path / "pictures" / "mirror" / "hard_03.png") as sheet:
+        expected = np.asarray(sheet.crop((0, 0, sheet.width, 256 + 32)))
+    assert np.array_equal(first, expected)
+
+
+def test_doubtful_comparisons_are_a_warning(one_scene, make_run, capsys) -> None:
+    def elsewhere(result: dict) -> None:
+        result["machine"] = {"processor": "another", "backend": "llvm"}
+        result["run_seconds"] = 1.1 * result["run_seconds"]
+
+    folder = make_run(sampler="mcmc_loss", change=elsewhere)
+    assert main([str(one_scene)]) == 0
+    printed = capsys.readouterr().err
+    written = (one_scene / "report" / "results.md").read_text()
+    times = f"mirror: the runs were not given the same time: 240 s in {one_scene}"
+    machines = "the runs come from different machines: "
+    for line in (times, machines):
+        assert f"warning: {line}" in printed
+        assert f"- Warning: {line}" in written
+    assert f"264 s in {folder}" in printed
+    assert f"another, llvm in {folder}" in written
+
+
+def test_scenes_may_take_different_times(one_scene, make_run, capsys) -> None:
+    make_run(scene="sphere-caustic", change=lambda result: result.update(run_seconds=900.0))
+    assert main([str(one_scene)]) == 0
+    assert capsys.readouterr().err == ""
+
+
+def test_floors_that_are_lower_bounds_are_called_so(one_scene, capsys) -> None:
+    assert main([str(one_scene)]) == 0
+    assert "for DSSIM and LPIPS a lower bound" in capsys.readouterr().out
+
+
 def test_missing_pictures_are_a_warning(two_scenes, capsys) -> None:
     (two_scenes / "mirror" / "uniform" / "seed=0" / "pictures" / "hard_01_error.png").unlink()
     assert main([str(two_scenes)]) == 0

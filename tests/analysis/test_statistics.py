@@ -37,6 +37,13 @@ def test_values_that_are_not_finite_are_not_dropped(bad: float) -> None:
     assert result.half_width is None
 
 
+def test_relative_difference_to_zero_is_undefined() -> None:
+    result = paired_difference({0: 0.0, 1: 1.0}, {0: 0.5, 1: 0.5})
+    assert result is not None
+    assert math.isnan(result.mean)
+    assert result.half_width is None
+
+
 def test_pairs_are_made_by_seed() -> None:
     baseline = {0: 1.0, 1: 10.0, 2: 100.0, 7: 5.0}
     other = {2: 90.0, 1: 9.0, 0: 0.9, 8: 5.0}

@@ -5,9 +5,9 @@ import pytest
 
 from analysis.latex import escape, to_latex
 from analysis.methods import name_methods
-from analysis.runs import find_runs
+from analysis.runs import METRICS, SETS, find_runs
 from analysis.statistics import Estimate, estimate
-from analysis.summary import compare, summarise, to_frame
+from analysis.summary import Comparison, compare, summarise, to_frame
 from analysis.tables import (
     Cell,
     Table,
@@ -49,7 +49,7 @@ def test_lpips_of_some_runs_only_is_left_empty(make_run, tmp_path) -> None:
     assert to_terminal(error_table([uniform])).splitlines()[3].split()[-1] == "–"
 
 
-def test_comparison_is_paired_and_relative_to_uniform(summaries, make_run, tmp_path) -> None:
+def test_comparison_is_paired_and_relative_to_uniform(summaries) -> None:
     (comparison,) = compare(summaries)
     assert (comparison.baseline, comparison.other) == ("uniform", "mcmc_loss_step")
     differences = []
@@ -60,8 +60,27 @@ def test_comparison_is_paired_and_relative_to_uniform(summaries, make_run, tmp_p
     result = comparison.differences["hard_mape"]
     assert result.mean == pytest.approx(sum(differences) / 3)
     assert f"{100 * result.mean:+.1f}" in to_terminal(comparison_table([comparison]))
+
+
+def test_every_method_is_compared_with_the_baseline(make_run, tmp_path) -> None:
+    def pairs() -> list[tuple[str, str]]:
+        comparisons = compare(summarise(name_methods(find_runs(tmp_path)[0])))
+        return [(comparison.baseline, comparison.other) for comparison in comparisons]
+
     make_run(sampler="mcmc_loss")
-    assert compare(summarise(name_methods(find_runs(tmp_path)[0]))) == []
+    assert pairs() == []
+    make_run(sampler="mcmc_loss_step")
+    make_run(sampler="mcmc_gradient")
+    assert pairs() == [("mcmc_gradient", "mcmc_loss"), ("mcmc_gradient", "mcmc_loss_step")]
+    make_run()
+    others = ("mcmc_gradient", "mcmc_loss", "mcmc_loss_step")
+    assert pairs() == [("uniform", other) for other in others]
+
+
+def test_undefined_difference_is_shown_as_missing() -> None:
+    differences = {f"{s}_{m}": Estimate(math.nan, None, 1) for s in SETS for m in METRICS}
+    text = to_terminal(comparison_table([Comparison("s", "a", "b", differences)]))
+    assert text.splitlines()[-1].split()[-8:] == ["–"] * 8
 
 
 def test_frame_holds_every_number(summaries, tmp_path) -> None:
@@ -82,6 +101,18 @@ def test_the_best_mean_of_a_scene_is_marked(summaries) -> None:
     assert marks == {"uniform": 0, "mcmc_loss_step": 8, "reference": 0}
     assert to_markdown(worst_table(summaries)).count("**") == 2 + 2 * 8
     assert "*" not in to_terminal(cost_table(summaries))
+
+
+@pytest.mark.parametrize("first", [True, False])
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_a_mean_that_is_not_finite_is_never_the_best(make_run, tmp_path, bad, first) -> None:
+    def spoil(result: dict) -> None:
+        result["metrics"]["hard"]["mape"]["mean"] = bad
+
+    make_run(sampler="a", **({"change": spoil} if first else {}))
+    make_run(sampler="b", **({} if first else {"change": spoil}))
+    (a, b, _) = error_table(summarise(name_methods(find_runs(tmp_path)[0]))).rows
+    assert (a[3].best, b[3].best) == (not first, first)
 
 
 def test_numbers_have_three_significant_digits() -> None:

@@ -8,7 +8,6 @@ from torch import Tensor
 
 from ngi.evaluate import EvaluationProtocol
 from ngi.patches import BufferLayout
-from ngi.render.protocol import RenderedImage
 
 
 class NoisyRenderer:
@@ -24,6 +23,7 @@ class NoisyRenderer:
     def __init__(self, *, noise: float = 0.5) -> None:
         self.noise = noise
         self.seeds: list[int] = []
+        self.buffer_passes = 0
 
     def truth(self, scene_vector: Tensor, resolution: int) -> Tensor:
         y, x = torch.meshgrid(*[torch.linspace(0, 1, resolution)] * 2, indexing="ij")
@@ -31,14 +31,16 @@ class NoisyRenderer:
 
     def render_image(
         self, scene_vector: Tensor, *, resolution: int, samples_per_pixel: int, seed: int
-    ) -> RenderedImage:
+    ) -> Tensor:
         self.seeds.append(seed)
         generator = torch.Generator().manual_seed(seed)
         radiance = self.truth(scene_vector, resolution)
         noise = torch.randn(radiance.shape, generator=generator) * self.noise
-        return RenderedImage(
-            buffers=radiance.clone(), radiance=radiance + noise / samples_per_pixel**0.5
-        )
+        return radiance + noise / samples_per_pixel**0.5
+
+    def image_buffers(self, scene_vector: Tensor, *, resolution: int) -> Tensor:
+        self.buffer_passes += 1
+        return self.truth(scene_vector, resolution)
 
     def hard_frames(self) -> Tensor:
         return torch.linspace(0, 1, 30).reshape(10, 3)

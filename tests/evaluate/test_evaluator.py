@@ -44,6 +44,8 @@ def test_perfect_prediction_scores_the_floor(evaluator) -> None:
         for metric in ("mape", "mae", "lpips"):
             summary = result["metrics"][name][metric]
             assert summary["mean"] == pytest.approx(summary["floor"], rel=0.05)
+        dssim = result["metrics"][name]["dssim"]
+        assert dssim["floor"] < dssim["mean"] < 3 * dssim["floor"]
 
 
 def test_values_are_those_of_the_metrics(evaluator, renderer, protocol, tmp_path) -> None:
@@ -53,7 +55,8 @@ def test_values_are_those_of_the_metrics(evaluator, renderer, protocol, tmp_path
     expected = []
     for v in renderer.hard_frames():
         reference = cache.get(renderer, protocol, v)
-        expected.append(mape(reference.buffers * (1 + v[0]), reference.radiance, 0.01))
+        truth = renderer.truth(v, protocol.resolution)
+        expected.append(mape(truth * (1 + v[0]), reference.radiance, 0.01))
     frames = [frame for frame in result["frames"] if frame["set"] == "hard"]
     assert [frame["mape"] for frame in frames] == pytest.approx(expected, rel=1e-5)
     summary = result["metrics"]["hard"]["mape"]
@@ -83,6 +86,35 @@ def test_gradients_are_off_and_references_rendered_once(evaluator, renderer) -> 
     renderer.seeds.clear()
     assert evaluator.evaluate(perfect).reference_hash == first.reference_hash
     assert not renderer.seeds
+
+
+def test_buffers_come_from_the_present_renderer(evaluator, renderer, protocol, tmp_path) -> None:
+    evaluator.prepare()
+    evaluator.evaluate(perfect)
+    assert renderer.buffer_passes == 14
+    other = type(renderer)()
+    other.image_buffers = lambda v, *, resolution: torch.full(
+        (resolution, resolution, 5), v[0].item()
+    )
+    cache = ReferenceCache(tmp_path / "references")
+    again = Evaluator(renderer=other, protocol=protocol, cache=cache, lpips=NoLpips())
+
+    def predict(buffers: torch.Tensor, scene_vector: torch.Tensor) -> torch.Tensor:
+        assert torch.equal(buffers, scene_vector[0].expand(33, 33, 5))
+        return buffers[..., :3]
+
+    assert again.evaluate(predict).reference_hash == evaluator.evaluate(perfect).reference_hash
+    assert not other.seeds
+
+
+def test_result_says_how_good_every_reference_is(evaluator, renderer, protocol, tmp_path) -> None:
+    frames = evaluator.evaluate(perfect).result()["frames"]
+    assert len(frames) == 14
+    cache = ReferenceCache(tmp_path / "references")
+    for frame, v in zip(frames, renderer.hard_frames(), strict=False):
+        reference = cache.get(renderer, protocol, v)
+        assert frame["reference_noise"] == reference.noise <= protocol.target_noise
+        assert frame["reference_samples_per_pixel"] == reference.samples_per_pixel
 
 
 def test_reference_hash_follows_the_references(evaluator, protocol, renderer, tmp_path) -> None:

@@ -69,6 +69,20 @@ def test_equal_images_have_no_error() -> None:
     assert (mape(x, x, 0.01), mae(x, x), dssim(x, x)) == (0.0, 0.0, pytest.approx(0.0, abs=1e-12))
 
 
+def test_dssim_of_noise_on_a_smooth_picture() -> None:
+    # As `Reference.radiance` says: the floor is too low, by a factor of at most 3.
+    C2 = 0.03**2
+    generator = torch.Generator().manual_seed(0)
+    truth = torch.full((256, 256, 3), 0.5, dtype=torch.float64)
+    for s in (0.01 * C2, C2, 10 * C2):
+        a, b = (
+            truth + (2 * s) ** 0.5 * torch.randn(truth.shape, generator=generator) for _ in range(2)
+        )
+        mean = (a + b) / 2
+        assert dssim(truth, mean) == pytest.approx(0.5 * s / (s + C2), rel=0.1)
+        assert dssim(a, mean) == pytest.approx(0.5 * s / (3 * s + C2), rel=0.1)
+
+
 def test_tone_map_is_the_srgb_curve_of_scikit_image() -> None:
     linear = torch.linspace(0, 1, 3000).reshape(-1, 3).double()
     xyz = np.tensordot(linear.numpy(), color.rgb2xyz(np.eye(3)[None])[0], axes=1)

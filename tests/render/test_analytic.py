@@ -18,33 +18,34 @@ def test_patch_equals_the_same_pixels_of_the_image() -> None:
     state = states(1)
     patch = renderer.render_patches(state, resolution=20, seed=0)
     image = renderer.render_image(state[0, :3], resolution=20, samples_per_pixel=1, seed=0)
+    buffers = renderer.image_buffers(state[0, :3], resolution=20)
     x, y = (int(p * 13) for p in state[0, 3:])
-    torch.testing.assert_close(patch.buffers[0], image.buffers[y : y + 8, x : x + 8])
-    torch.testing.assert_close(patch.log_radiance[0].expm1(), image.radiance[y : y + 8, x : x + 8])
+    torch.testing.assert_close(patch.buffers[0], buffers[y : y + 8, x : x + 8])
+    torch.testing.assert_close(patch.log_radiance[0].expm1(), image[y : y + 8, x : x + 8])
 
 
 @pytest.mark.parametrize("dimensions", [1, 2, 7, 128])
 def test_radiance_depends_on_every_component_of_v(dimensions) -> None:
     renderer = make(dimensions=dimensions)
     v = torch.full((dimensions,), 0.5, dtype=torch.float32)
-    image = renderer.render_image(v, resolution=8, samples_per_pixel=1, seed=0).radiance
+    image = renderer.render_image(v, resolution=8, samples_per_pixel=1, seed=0)
     for i in range(dimensions):
         moved = v.clone()
         moved[i] = 0.8
-        other = renderer.render_image(moved, resolution=8, samples_per_pixel=1, seed=0).radiance
+        other = renderer.render_image(moved, resolution=8, samples_per_pixel=1, seed=0)
         assert (image - other).abs().max() > 1e-2
 
 
 def test_lamp_shows_in_radiance_and_emission_alike() -> None:
-    image = make().render_image(torch.rand(3), resolution=64, samples_per_pixel=1, seed=0)
+    v = torch.tensor([0.2, 0.5, 0.9])
+    radiance = make().render_image(v, resolution=64, samples_per_pixel=1, seed=0)
     without = make(layout=BufferLayout(("position", "roughness")))
-    dark = without.render_image(torch.rand(3), resolution=64, samples_per_pixel=1, seed=0)
-    assert dark.buffers.shape == (64, 64, 4)
-    emission = image.buffers[..., BufferLayout().slice("emission")].expm1()
+    assert without.image_buffers(v, resolution=64).shape == (64, 64, 4)
+    emission = make().image_buffers(v, resolution=64)[..., BufferLayout().slice("emission")].expm1()
     lit = emission[..., 0] > 0
     assert abs(lit.float().mean() - torch.pi * 0.08**2) < 2e-3
     torch.testing.assert_close(emission[lit], torch.full_like(emission[lit], 3))
-    assert (image.radiance[lit] > 3).all()
+    assert (radiance[lit] > 3).all()
 
 
 def test_noise_is_seeded_per_state_and_falls_with_the_samples() -> None:
@@ -66,6 +67,13 @@ def test_hard_frames_and_hash() -> None:
     assert ((frames >= 0) & (frames <= 1)).all()
     assert len(frames.unique(dim=0)) == 10
     assert make().scene_hash == make(patch_size=4).scene_hash != make(dimensions=4).scene_hash
+
+
+def test_hash_follows_whatever_changes_an_image(monkeypatch) -> None:
+    renderers = [make(), make(noise=0.1), make(noise=0.2), make(layout=BufferLayout(("position",)))]
+    hashes = {renderer.scene_hash for renderer in renderers}
+    monkeypatch.setattr("ngi.render.analytic.FORMULA_VERSION", 2)
+    assert len(hashes | {make().scene_hash}) == 5
 
 
 @pytest.mark.parametrize("bad", [{"dimensions": 0}, {"patch_size": 0}, {"noise": -1.0}])

@@ -55,8 +55,7 @@ def truth():
 @pytest.fixture(scope="module", params=["llvm", "scalar"])
 def image(request, load_box):
     renderer = load_box(request.param, buffer_samples=1, patch_size=16)
-    rendered = renderer.render_image(V, resolution=RESOLUTION, samples_per_pixel=1, seed=0)
-    buffers = rendered.buffers.numpy()
+    buffers = renderer.image_buffers(V, resolution=RESOLUTION).numpy()
     return {name: buffers[..., renderer.layout.slice(name)] for name in renderer.layout.names}
 
 
@@ -114,8 +113,8 @@ def test_emission_is_log1p_of_what_the_lamp_emits(image, truth) -> None:
 def test_box_filter_averages_over_the_pixel(load_box) -> None:
     fine = load_box("llvm", buffer_samples=1, patch_size=16)
     coarse = load_box("llvm", buffer_samples=64, patch_size=16)
-    image = coarse.render_image(V, resolution=16, samples_per_pixel=1, seed=0).buffers
-    blocks = fine.render_image(V, resolution=256, samples_per_pixel=1, seed=0).buffers
+    image = coarse.image_buffers(V, resolution=16)
+    blocks = fine.image_buffers(V, resolution=256)
     mean = blocks.reshape(16, 16, 16, 16, -1).mean((1, 3))
     linear = [
         i for name in ("position", "albedo") for i in range(*fine.layout.slice(name).indices(99))

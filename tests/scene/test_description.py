@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ngi.scene import Variable, read_scene, scene_vector_of, variable_values
+from ngi.scene.yaml_keys import load_yaml
 
 BOX = Path(__file__).parents[1] / "render" / "scenes" / "box"
 SCENES = sorted(p.parent for p in (Path(__file__).parents[2] / "scenes").glob("*/scene.yaml"))
@@ -102,6 +103,9 @@ def test_hash_follows_named_files(box) -> None:
     ("old", "new", "message"),
     [
         ("name: box", "name: [box", r"scene.yaml, line \d+: broken YAML"),
+        ("name: box", "name: box\nname: box", r"line 2: .*the key 'name' is there twice"),
+        ("property: albedo,", "property: albedo, property: albedo,", "'property' is there twice"),
+        ("name: box", "name: b\x01ox", "scene.yaml: broken YAML: unacceptable character"),
         ("name: box", "nam: box", "name is missing; add it"),
         ("name: box", "name: box\nmax_deth: 3", "unknown key 'max_deth'; did you mean 'max_depth'"),
         ("max_depth: 4", "max_depth: 5", "max_depth is 5, but 4 in the integrator of"),
@@ -153,6 +157,20 @@ def test_bad_yaml(box, old, new, message) -> None:
     assert str(box) in str(error.value)
 
 
+def test_yaml_of_another_encoding(box) -> None:
+    (box / "scene.yaml").write_bytes("name: böx".encode("latin-1"))
+    with pytest.raises(ValueError, match=r"scene.yaml: not UTF-8 .*0xf6") as error:
+        read_scene(box)
+    assert "\n" not in str(error.value)
+    assert not isinstance(error.value, UnicodeDecodeError)
+
+
+def test_merged_keys_may_be_overridden(tmp_path) -> None:
+    file = tmp_path / "a.yaml"
+    file.write_text("base: &base {a: 1, b: 2}\nmore: {<<: *base, b: 3}\n")
+    assert load_yaml(file)["more"] == {"a": 1, "b": 3}
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
@@ -163,6 +181,11 @@ def test_bad_yaml(box, old, new, message) -> None:
             "hide_emitters is true",
         ),
         ("integrator", "x", "not well-formed XML"),
+        (
+            'name="max_depth" value="4"',
+            'name="max_depth" value="four"',
+            "scene.xml: the integrator's max_depth is 'four'; expected an integer",
+        ),
     ],
 )
 def test_bad_xml(box, old, new, message) -> None:

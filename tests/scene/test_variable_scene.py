@@ -110,3 +110,16 @@ def test_unknown_objects_and_properties(tmp_path, old, new, message) -> None:
     (folder / "scene.yaml").write_text(text.replace(old, new))
     with pytest.raises(ValueError, match=message):
         VariableScene(read_scene(folder))
+
+
+@pytest.mark.usefixtures("scene")
+def test_reflectance_of_one_number_is_refused(tmp_path) -> None:
+    folder = Path(shutil.copytree(BOX, tmp_path / "box"))
+    text = (folder / "scene.xml").read_text()
+    old = '<rgb name="reflectance" value="0.6, 0.1, 0.1"/>'
+    assert old in text
+    (folder / "scene.xml").write_text(
+        text.replace(old, '<spectrum name="reflectance" value="0.6"/>')
+    )
+    with pytest.raises(ValueError, match=r"'left_wall': .* 1 number.* as <rgb>, not as <spectrum>"):
+        VariableScene(read_scene(folder))
