@@ -73,15 +73,6 @@ class Evaluator:
                         f"{samples} spp, noise {noise:.1%}"
                     ),
                 )
-                if reference.noise > self.protocol.target_noise:
-                    log.info(
-                        "reference %s %d: noise %.1f %% after %d samples per pixel, wanted %.1f %%",
-                        frame.set,
-                        frame.index,
-                        100 * reference.noise,
-                        reference.samples_per_pixel,
-                        100 * self.protocol.target_noise,
-                    )
                 digest.update(f"{frame.set}/{frame.index}/{reference.content_hash}\n".encode())
                 prepared.append(
                     _PreparedFrame(
@@ -93,6 +84,22 @@ class Evaluator:
                 )
         self._reference_hash = digest.hexdigest()[:16]
         self._prepared = tuple(prepared)
+        self._report_noise()
+
+    def _report_noise(self) -> None:
+        """One line where references stayed above the protocol's noise level."""
+        noises = [prepared.reference.noise for prepared in self._prepared]
+        above = [noise for noise in noises if noise > self.protocol.target_noise]
+        if above:
+            log.info(
+                "%d of %d references stayed above %.1f %% noise at %d samples per pixel, the worst "
+                "at %.1f %%",
+                len(above),
+                len(noises),
+                100 * self.protocol.target_noise,
+                self.protocol.maximum_samples,
+                100 * max(above),
+            )
 
     def evaluate(self, predict: Predict) -> Evaluation:
         """Predicts and measures every test frame.

@@ -218,3 +218,16 @@ def test_evaluation_is_immutable(evaluator) -> None:
     evaluation = evaluator.evaluate(perfect)
     with pytest.raises(dataclasses.FrozenInstanceError):
         evaluation.reference_hash = "other"
+
+
+@pytest.mark.parametrize(("target_noise", "said"), [(1e-9, True), (10.0, False)])
+def test_references_above_the_noise_level_are_reported_once(
+    renderer, protocol, tmp_path, caplog, target_noise, said
+) -> None:
+    demanding = dataclasses.replace(protocol, target_noise=target_noise)
+    cache = ReferenceCache(tmp_path / "references")
+    evaluator = Evaluator(renderer=renderer, protocol=demanding, cache=cache, lpips=NoLpips())
+    with caplog.at_level("INFO"):
+        evaluator.prepare()
+    lines = [r for r in caplog.records if "references stayed above" in r.getMessage()]
+    assert len(lines) == int(said)
