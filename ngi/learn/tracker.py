@@ -39,7 +39,7 @@ class Local:
 class WeightsAndBiases:
     """Weights & Biases, offline unless `mode` says 'online'.
 
-    Runs are grouped by experiment and tagged by scene, sampler and seed. Offline runs lie in the
+    Runs are grouped by experiment, and tagged by experiment, scene, sampler and seed. Offline runs lie in the
     run's folder; `wandb sync` sends them.
     """
 
@@ -60,7 +60,7 @@ class WeightsAndBiases:
             config=settings,
             group=label["experiment"],
             name="/".join(str(label[key]) for key in ("scene", "sampler", "seed")),
-            tags=[f"{key}={label[key]}" for key in ("scene", "sampler", "seed")],
+            tags=[f"{key}={label[key]}" for key in ("experiment", "scene", "sampler", "seed")],
             reinit="finish_previous",
             settings=wandb.Settings(quiet=True),
         )
