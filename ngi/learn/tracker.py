@@ -39,8 +39,8 @@ class Local:
 class WeightsAndBiases:
     """Weights & Biases, offline unless `mode` says 'online'.
 
-    Runs are grouped by experiment, and tagged by experiment, scene, sampler and seed. Offline runs lie in the
-    run's folder; `wandb sync` sends them.
+    Runs are grouped by experiment, and tagged by experiment, scene, sampler and seed. Offline runs
+    lie in the run's folder; `wandb sync` sends them.
     """
 
     def __init__(self, *, project: str, mode: str) -> None:
