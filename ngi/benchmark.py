@@ -19,6 +19,7 @@ from pathlib import Path
 import torch
 from tqdm import tqdm
 
+from ngi.backend import activate, describe
 from ngi.explore import LossTimesOutputGradient, LossTimesStep
 from ngi.learn import PhaseClock, Scorer
 from ngi.memory import keep_freed_memory
@@ -250,7 +251,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     ]
     print(table(figures))
     chosen.output.parent.mkdir(parents=True, exist_ok=True)
-    report = {**provenance(backend=""), "figures": [asdict(f) for f in figures]}
+    report = {**provenance(backend=describe(activate())), "figures": [asdict(f) for f in figures]}
     chosen.output.write_text(json.dumps(report, indent=2))
     print(f"\nwritten to {chosen.output}")
     return 0

@@ -24,6 +24,11 @@ from ngi.learn.tracker import Tracker
 log = logging.getLogger(__name__)
 
 
+def budget_used(budget: Budget, stream: TrainingStream, clock: PhaseClock) -> float:
+    """The part of the budget that is used up by now."""
+    return budget.fraction(steps=stream.counters.iteration, run_seconds=clock.run_seconds)
+
+
 class SamplerFeedback(Callback):
     """Times the training phase, hands each step's feedback to the stream and logs the step."""
 
@@ -91,9 +96,7 @@ class PeriodicEvaluation(Callback):
         self._done = 0
 
     def on_train_batch_end(self, *_: Any) -> None:
-        used = self._budget.fraction(
-            steps=self._stream.counters.iteration, run_seconds=self._clock.run_seconds
-        )
+        used = budget_used(self._budget, self._stream, self._clock)
         due = int(used * self._count)
         if used < 1 and due > self._done:
             self._recorder.evaluate()
@@ -134,7 +137,7 @@ class BudgetAndCheckpoint(Callback):
         self._bar: tqdm[Any] | None = None
 
     def on_train_start(self, trainer: Trainer, *_: Any) -> None:
-        used = self._used()
+        used = budget_used(self._budget, self._stream, self._clock)
         trainer.should_stop = used >= 1  # killed after its last step, before its result
         self._saved_at = self._clock.run_seconds
         self._saved_step = self._stream.counters.iteration
@@ -149,11 +152,8 @@ class BudgetAndCheckpoint(Callback):
     def on_train_batch_end(
         self, trainer: Trainer, _module: LightningModule, outputs: Any, *_: Any
     ) -> None:
-        steps, seconds, used = (
-            self._stream.counters.iteration,
-            self._clock.run_seconds,
-            self._used(),
-        )
+        steps, seconds = self._stream.counters.iteration, self._clock.run_seconds
+        used = budget_used(self._budget, self._stream, self._clock)
         self._show(min(used, 1.0), float(outputs["loss"]))
         periodic = self._every_steps is not None and steps % self._every_steps == 0
         if used >= 1 or periodic or seconds - self._saved_at >= self._every_seconds:
@@ -177,11 +177,6 @@ class BudgetAndCheckpoint(Callback):
                 self._stream.counters.iteration,
                 self._saved_step,
             )
-
-    def _used(self) -> float:
-        return self._budget.fraction(
-            steps=self._stream.counters.iteration, run_seconds=self._clock.run_seconds
-        )
 
     def _save(self, trainer: Trainer) -> None:
         self._folder.steps.flush()

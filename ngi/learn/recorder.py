@@ -2,23 +2,15 @@
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Callable
 from typing import Any
 
-from torch import Tensor
-
 from ngi.evaluate import Evaluation, Evaluator
+from ngi.evaluate.evaluator import Predict
 from ngi.learn.clock import PhaseClock
 from ngi.learn.run_folder import RunFolder
 from ngi.learn.stream import TrainingStream
 from ngi.learn.tracker import Tracker
 from ngi.provenance import provenance
-
-log = logging.getLogger(__name__)
-
-Predict = Callable[[Tensor, Tensor], Tensor]
-"""(buffers [H, W, C], v [D]) -> log1p radiance [H, W, 3]"""
 
 
 class Recorder:
