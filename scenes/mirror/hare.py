@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from meshes import Mesh
+from modelling.meshes import Mesh
 from skimage.measure import marching_cubes
 
 

@@ -12,13 +12,18 @@ Lengths are metres; the room spans x in [-3.4, 3.4], y in [0, 2.8], z in [-2.2, 
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
 import numpy as np
-from hare import hare
-from meshes import Mesh, box, sweep, turned, write_ply
 from PIL import Image
-from textures import PALETTES, floor_boards, landscape
+
+sys.path.append(str(Path(__file__).parents[1]))
+
+from hare import hare
+from landscape import PALETTES, landscape
+from modelling.meshes import Mesh, box, sweep, turned, write_ply
+from modelling.textures import floor_boards
 
 ROOM_MINIMUM = np.array([-3.4, 0.0, -2.2])
 ROOM_MAXIMUM = np.array([3.4, 2.8, 2.6])
