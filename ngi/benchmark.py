@@ -26,8 +26,8 @@ from ngi.memory import keep_freed_memory
 from ngi.models import L1Dssim, PatchLinear, PixelGenerator
 from ngi.patches import BufferLayout, Patches
 from ngi.provenance import provenance
-from ngi.resources import scene_folders
 from ngi.reuse import PatchStore
+from ngi.scene import read_scene, scenes
 
 PATCHES = 16
 PATCH_SIZE = 32
@@ -77,13 +77,12 @@ def generation(scene: str, samples_per_pixel: int, repeats: int) -> list[Figure]
     from ngi.render.measure import FixedLaunch, counted_compilations
     from ngi.render.mitsuba_renderer import MitsubaRenderer
 
+    description = read_scene(**scenes()[scene])
     renderer = MitsubaRenderer(
-        scene=scene_folders()[scene], patch_size=PATCH_SIZE, samples_per_pixel=samples_per_pixel
+        scene=description, patch_size=PATCH_SIZE, samples_per_pixel=samples_per_pixel
     )
     paths = PATCHES * PATCH_SIZE**2 * samples_per_pixel
-    fixed = FixedLaunch(
-        scene_folders()[scene] / "scene.xml", paths=paths, samples_per_pixel=samples_per_pixel
-    )
+    fixed = FixedLaunch(description, paths=paths, samples_per_pixel=samples_per_pixel)
     generator = torch.Generator().manual_seed(0)
     calls = iter(range(1_000_000))
 
@@ -237,7 +236,7 @@ def table(figures: Sequence[Figure]) -> str:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point of `python -m ngi.benchmark` and `ngi-benchmark`."""
     parser = argparse.ArgumentParser(prog="ngi.benchmark", description=__doc__)
-    parser.add_argument("--scene", default="sphere-caustic", choices=sorted(scene_folders()))
+    parser.add_argument("--scene", default="sphere-caustic", choices=sorted(scenes()))
     parser.add_argument("--samples-per-pixel", type=int, default=64)
     parser.add_argument("--repeats", type=int, default=20, help="timings per figure")
     parser.add_argument("--output", type=Path, default=Path("outputs/benchmark.json"))

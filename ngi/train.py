@@ -18,8 +18,9 @@ from omegaconf import DictConfig, OmegaConf
 import ngi
 from ngi.memory import keep_freed_memory
 from ngi.precision import fast_precision
-from ngi.resources import cache_folder, root, scene_folders
+from ngi.resources import cache_folder, root
 from ngi.run_name import run_name
+from ngi.scene import scenes
 
 if TYPE_CHECKING:
     from ngi.learn import Budget, RunFolder, Tracker
@@ -157,10 +158,12 @@ def register() -> None:
     """Makes scene folders options of the group `scene`, and the resolvers known to OmegaConf."""
     os.environ["NGI_ROOT"] = str(root())
     store = ConfigStore.instance()
-    for name, folder in scene_folders().items():
-        store.store(group="scene", name=name, node={"name": name, "folder": str(folder)})
+    for name, arguments in scenes().items():
+        reader = {"_target_": "ngi.scene.read_scene", **arguments}
+        store.store(group="scene", name=name, node={"name": name, "reader": reader})
     OmegaConf.register_new_resolver("run_name", run_name, replace=True)
     OmegaConf.register_new_resolver("fast_precision", fast_precision, replace=True)
+    OmegaConf.register_new_resolver("folder_name", lambda path: Path(path).name, replace=True)
     OmegaConf.register_new_resolver("cache_folder", lambda: str(cache_folder()), replace=True)
 
 

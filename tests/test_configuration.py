@@ -97,4 +97,4 @@ def test_a_scene_is_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     (tmp_path / "mine" / "scene.yaml").write_text("name: mine\n")
     monkeypatch.setenv("NGI_SCENES", str(tmp_path))
     assert scene_folders()["mine"] == tmp_path / "mine"
-    assert composed("scene=mine").scene.folder == str(tmp_path / "mine")
+    assert composed("scene=mine").scene.reader.folder == str(tmp_path / "mine")

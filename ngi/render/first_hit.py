@@ -22,8 +22,7 @@ class FirstHit:
 
     layout: BufferLayout
     materials: list[Material]
-    bounds_minimum: tuple[float, ...]
-    bounds_maximum: tuple[float, ...]
+    bounds: tuple[tuple[float, ...], tuple[float, ...]]
 
     def channels(self, scene: mi.Scene, ray: mi.Ray3f) -> list[mi.Float]:
         """One value per channel and ray; a ray that misses gives zeros, but the environment's
@@ -31,8 +30,8 @@ class FirstHit:
         """
         hit = scene.ray_intersect(ray)
         valid = hit.is_valid()
-        low = np.array(self.bounds_minimum)
-        extent = np.array(self.bounds_maximum) - low
+        low, high = map(np.array, self.bounds)
+        extent = high - low
         albedo, roughness = evaluate_materials(self.materials, hit, valid)
         buffers = {
             "position": (hit.p - mi.Vector3f(*low.tolist())) / mi.Vector3f(*extent.tolist()),
@@ -52,13 +51,11 @@ class FirstHit:
 
 def first_hit_of(scene: VariableScene) -> FirstHit:
     """The first-hit buffers that a scene needs; ValueError for a BSDF of an unknown kind."""
-    materials = collect_materials(scene.shapes)
-    description = scene.description
+    materials = collect_materials(scene.bsdfs())
     return FirstHit(
         layout=_needed_buffers(scene, materials),
         materials=materials,
-        bounds_minimum=description.bounds_minimum,
-        bounds_maximum=description.bounds_maximum,
+        bounds=scene.description.bounds,
     )
 
 
@@ -69,7 +66,7 @@ def _needed_buffers(scene: VariableScene, materials: list[Material]) -> BufferLa
     constant zero where no shape emits and there is no environment.
     """
     left_out = set()
-    varied = {variable.property for variable in scene.description.variables}
+    varied = {name for variable in scene.description.variables for name in variable.affects}
     roughness = {material.constant_roughness for material in materials}
     if len(roughness) == 1 and None not in roughness and "roughness" not in varied:
         left_out.add("roughness")

@@ -18,7 +18,6 @@ Lookup = Callable[..., Any]
 """(hit: SurfaceInteraction3f, active: Bool) -> Color3f or Float."""
 
 _WRAPPERS = {"TwoSidedBRDF": "brdf_0", "BumpMap": "nested_bsdf", "NormalMap": "nested_bsdf"}
-_NEVER_HIT = ("Instance", "ShapeGroup")
 
 
 @dataclass(frozen=True)
@@ -36,12 +35,8 @@ class Material:
     constant_roughness: float | None
 
 
-def collect_materials(shapes: list[mi.Shape]) -> list[Material]:
-    """The materials of the shapes' BSDFs; ValueError for a BSDF of a kind that is not known."""
-    bsdfs: list[mi.BSDF] = []
-    for shape in shapes:
-        if shape.class_name() not in _NEVER_HIT and shape.bsdf() not in bsdfs:
-            bsdfs.append(shape.bsdf())
+def collect_materials(bsdfs: list[mi.BSDF]) -> list[Material]:
+    """The materials of BSDFs; ValueError for a BSDF of a kind that is not known."""
     return [_material(bsdf) for bsdf in bsdfs]
 
 

@@ -5,26 +5,27 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from math import isqrt
-from pathlib import Path
 
 import numpy as np
 
 from ngi.backend import dr, mi
+from ngi.scene import SceneDescription
+from ngi.scene.loading import load
 
 
 class FixedLaunch:
     """Mitsuba's time for `paths` camera paths: one launch, one configuration, nothing around it.
 
-    scene_file: of Mitsuba, traced as authored; the variant must be active
+    scene: traced as authored; the variant must be active.
     paths: number of paths of one launch; paths / samples_per_pixel is a square number.
     """
 
-    def __init__(self, scene_file: Path, *, paths: int, samples_per_pixel: int) -> None:
+    def __init__(self, scene: SceneDescription, *, paths: int, samples_per_pixel: int) -> None:
         pixels = isqrt(paths // samples_per_pixel)
         if pixels**2 * samples_per_pixel != paths:
             raise ValueError(f"{paths} paths are no square image at {samples_per_pixel} spp")
         # A scene of its own, which nobody moves.
-        self._scene = mi.load_file(str(scene_file), optimize=False)
+        self._scene = load(scene.document)
         self._samples = samples_per_pixel
         authored = mi.traverse(self._scene.sensors()[0])
         self._sensor = mi.load_dict(

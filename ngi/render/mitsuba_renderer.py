@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -16,7 +14,7 @@ from ngi.render.protocol import RenderedPatches
 from ngi.render.render_inputs import check_states, patch_window, require_positive
 from ngi.render.scalar_tracer import ScalarTracer
 from ngi.render.tracing import Pending, Tracer, Window, derive_seed
-from ngi.scene import read_scene
+from ngi.scene import SceneDescription
 from ngi.scene.variable_scene import VariableScene
 
 PATHS_PER_LAUNCH = 2**22
@@ -32,7 +30,7 @@ BUFFER_SAMPLES = {"cuda_ad_rgb": 16, "llvm_ad_rgb": 16, "scalar_rgb": 2}
 class MitsubaRenderer:
     """The `ngi.render.Renderer` of a scene folder (paper, Sec. 4 and 6).
 
-    scene: folder with scene.yaml and scene.xml.
+    scene: what `ngi.scene.read_scene` gives for a scene folder.
     backend: 'auto', 'cuda', 'llvm' or 'scalar', see `ngi.backend.activate`.
     patch_size: P, pixels along a patch's side.
     samples_per_pixel: of training patches; the scene's own number where None.
@@ -49,7 +47,7 @@ class MitsubaRenderer:
     def __init__(
         self,
         *,
-        scene: Path | str,
+        scene: SceneDescription,
         backend: str = "auto",
         patch_size: int = 32,
         samples_per_pixel: int | None = None,
@@ -59,9 +57,8 @@ class MitsubaRenderer:
         require_positive(
             patch_size=patch_size, **{name: n for name, n in given.items() if n is not None}
         )
-        scene_description = read_scene(scene)
         self._variant = activate(backend)
-        self._scene = VariableScene(scene_description)
+        self._scene = VariableScene(scene)
         self._require_square_film()
         first_hit = first_hit_of(self._scene)
         buffer_samples = buffer_samples or BUFFER_SAMPLES[self._variant]
@@ -81,10 +78,10 @@ class MitsubaRenderer:
                 for frozen in (True, False)
             )
         self.layout = first_hit.layout
-        self.dimensions = scene_description.dimensions
+        self.dimensions = scene.dimensions
         self.patch_size = patch_size
-        self.samples_per_pixel = samples_per_pixel or scene_description.samples_per_pixel
-        self.scene_hash = scene_description.scene_hash
+        self.samples_per_pixel = samples_per_pixel or scene.samples_per_pixel
+        self.scene_hash = scene.scene_hash
         self.description = describe(self._variant)
 
     def warm_up(self) -> None:
@@ -177,9 +174,10 @@ class MitsubaRenderer:
     def _require_square_film(self) -> None:
         width, height = self._scene.scene.sensors()[0].film().size()
         if width != height:
+            path = self._scene.description.document.path
             raise ValueError(
-                f"{self._scene.description.scene_file}: the film is {width} x {height}; make width "
-                "and height equal, since the virtual image is a square"
+                f"{path}: the film is {width} x {height}; make width and height equal, since the "
+                "virtual image is a square"
             )
 
 

@@ -4,24 +4,9 @@
 does not.
 """
 
-from ngi.scene.description import SceneDescription, read_scene
-from ngi.scene.properties import PROPERTIES, Property
-from ngi.scene.variables import (
-    Variable,
-    check_scene_vector,
-    component_names,
-    scene_vector_of,
-    variable_values,
-)
+from ngi.scene.description import SceneDescription
+from ngi.scene.folder import read_scene, scenes
+from ngi.scene.kinds import KINDS
+from ngi.scene.variable import Variable
 
-__all__ = [
-    "PROPERTIES",
-    "Property",
-    "SceneDescription",
-    "Variable",
-    "check_scene_vector",
-    "component_names",
-    "read_scene",
-    "scene_vector_of",
-    "variable_values",
-]
+__all__ = ["KINDS", "SceneDescription", "Variable", "read_scene", "scenes"]

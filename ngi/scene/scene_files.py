@@ -43,26 +43,30 @@ def named_files(scene: SceneFile) -> list[tuple[str, Path]]:
     Raises FileNotFoundError, with the name in the XML, for the first one that is missing.
     """
     files: list[tuple[str, Path]] = []
-    for element, name in _file_names(scene):
+    for tag, element, attribute in file_references(scene):
+        name = scene.value(element, attribute)
         path = scene.path.parent / name
         if not path.is_file():
             raise FileNotFoundError(
-                f"{scene.path}: <{element}> names '{name}', which is not there; "
+                f"{scene.path}: <{tag}> names '{name}', which is not there; "
                 f"bring the file to {path} or correct the name"
             )
         files.append((name, path))
-        if element == "include":
+        if tag == "include":
             files += named_files(read_scene_file(path))
     return files
 
 
-def _file_names(scene: SceneFile) -> Iterator[tuple[str, str]]:
+def file_references(
+    scene: SceneFile,
+) -> Iterator[tuple[str, ElementTree.Element, str]]:
+    """Where files are named: the tag of what needs the file, and the element and attribute."""
     for element in scene.root.iter():
         if element.tag == "include":
-            yield "include", scene.value(element, "filename")
+            yield "include", element, "filename"
         for child in element:
             if child.tag == "string" and child.get("name") == "filename":
-                yield element.tag, scene.value(child)
+                yield element.tag, child, "value"
 
 
 def integrator_max_depth(scene: SceneFile) -> int:

@@ -7,9 +7,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ngi.backend import mi
 from ngi.scene.description import SceneDescription
-from ngi.scene.properties import PROPERTIES
+from ngi.scene.kinds import Material
+from ngi.scene.loading import load
 from ngi.scene.scene_parameters import SceneParameters
-from ngi.scene.variables import variable_values
 
 
 class VariableScene:
@@ -21,23 +21,38 @@ class VariableScene:
 
     def __init__(self, description: SceneDescription) -> None:
         self.description = description
-        # Optimising would merge meshes that share a BSDF, and their ids would be lost.
-        self.scene: mi.Scene = mi.load_file(str(description.scene_file), optimize=False)
-        self._parameters = SceneParameters(self.scene, scene_file=description.scene_file)
+        self.scene: mi.Scene = load(description.document)
+        self._parameters = SceneParameters(
+            self.scene,
+            scene_file=description.document.path,
+            size=float(np.linalg.norm(np.subtract(*description.bounds))),
+        )
         self.shapes: list[mi.Shape] = self._parameters.objects(mi.Shape)
-        self._writes = [
-            PROPERTIES[variable.property].bind(self._parameters, variable.object, variable.axes)
-            for variable in description.variables
-        ]
+        self._writes = [variable.bind(self._parameters) for variable in description.variables]
         self._parameters.forget_the_rest()
         self._values: list[NDArray[np.float64] | None] = [None] * len(self._writes)
+
+    def bsdfs(self) -> list[mi.BSDF]:
+        """Every BSDF that a ray can hit at some v."""
+        shapes = [s for s in self.shapes if s.class_name() not in ("Instance", "ShapeGroup")]
+        chosen = [
+            self._parameters.object(name)
+            for variable in self.description.variables
+            if isinstance(variable, Material)
+            for name in variable.choices
+        ]
+        bsdfs: list[mi.BSDF] = []
+        for bsdf in [shape.bsdf() for shape in shapes] + chosen:
+            if bsdf not in bsdfs:
+                bsdfs.append(bsdf)
+        return bsdfs
 
     def apply(self, scene_vector: ArrayLike) -> None:
         """Sets the scene to v of shape [D] in [0, 1]; ValueError for any other v.
 
         Only what changed since the last v is written, so that an unmoved shape is never rebuilt.
         """
-        values = variable_values(self.description.variables, scene_vector)
+        values = self.description.values(scene_vector)
         changed = False
         for i, (write, value) in enumerate(zip(self._writes, values, strict=True)):
             present = self._values[i]

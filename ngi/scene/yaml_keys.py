@@ -90,20 +90,51 @@ class YamlKeys:
             raise self.error(key, value, f"expected {length} finite number(s)")
         return tuple(map(float, numbers))
 
+    def flag(self, key: str) -> bool:
+        """Whether a key that may be left out says true."""
+        if key not in self.values:
+            return False
+        self.taken.add(key)
+        if not isinstance(self.values[key], bool):
+            raise self.error(key, self.values[key], "expected true or false")
+        return bool(self.values[key])
+
+    def integers(self, key: str) -> list[int]:
+        value = self.take(key, list)
+        if not all(isinstance(entry, int) and entry > 0 for entry in value):
+            raise self.error(key, value, "expected positive integers")
+        return list(value)
+
+    def names(self, key: str, *, at_least: int) -> tuple[str, ...]:
+        """One name or a list of different ones."""
+        value = self.take(key, object)
+        names = value if isinstance(value, list) else [value]
+        if not all(isinstance(name, str) and name for name in names):
+            raise self.error(key, value, "expected a name or a list of names")
+        if len(set(names)) != len(names) or len(names) < at_least:
+            raise self.error(key, value, f"expected at least {at_least} different name(s)")
+        return tuple(names)
+
+    def vectors(self, key: str, *, length: int) -> tuple[Vector, ...]:
+        """A list of at least one vector."""
+        vectors = self.take(key, list)
+        if not vectors:
+            raise self.error(key, vectors, "give at least one")
+        keys = YamlKeys(self.path, self.prefix, {f"{key}[{i}]": f for i, f in enumerate(vectors)})
+        return tuple(keys.numbers(name, length=length) for name in keys.values)
+
     def frames(self, key: str, *, dimensions: int) -> tuple[Vector, ...]:
         """A list of at least one scene vector."""
-        frames = self.take(key, list)
-        if not frames:
-            raise self.error(key, frames, "give at least one frame")
-        keys = YamlKeys(self.path, self.prefix, {f"{key}[{i}]": f for i, f in enumerate(frames)})
-        vectors = [keys.numbers(name, length=dimensions) for name in keys.values]
-        for name, vector in zip(keys.values, vectors, strict=True):
+        vectors = self.vectors(key, length=dimensions)
+        for i, vector in enumerate(vectors):
             if not all(0 <= number <= 1 for number in vector):
-                raise self.error(name, list(vector), "every component of v lies between 0 and 1")
-        return tuple(vectors)
+                advice = "every component of v lies between 0 and 1"
+                raise self.error(f"{key}[{i}]", list(vector), advice)
+        return vectors
 
-    def check_range(self, low: Vector, high: Vector) -> None:
-        if not all(a < b for a, b in zip(low, high, strict=True)):
+    def check_range(self, low: Vector, high: Vector, *, strict: bool = False) -> None:
+        """ValueError for a maximum below its minimum; strict: for one equal to it too."""
+        if not all(a < b or (a == b and not strict) for a, b in zip(low, high, strict=True)):
             raise self.error("maximum", list(high), f"each must be above minimum {list(low)}")
 
     def finish(self) -> None:

@@ -5,6 +5,7 @@ import pytest
 
 from ngi.backend import llvm_problem
 from ngi.render.mitsuba_renderer import MitsubaRenderer
+from ngi.scene import read_scene
 
 BOX = Path(__file__).parent / "scenes" / "box"
 
@@ -24,7 +25,7 @@ def load_box() -> Callable[..., MitsubaRenderer]:
             pytest.skip(problem)
         key = (backend, *sorted(arguments.items()))
         if key not in loaded:
-            loaded[key] = MitsubaRenderer(scene=BOX, backend=backend, **arguments)
+            loaded[key] = MitsubaRenderer(scene=read_scene(BOX), backend=backend, **arguments)
         return loaded[key]
 
     return load

@@ -177,7 +177,9 @@ def test_pixels_of_an_image_that_are_not_finite_stay_so(load_box, monkeypatch) -
 
 
 def test_scalar_images_follow_the_camera(box_folder) -> None:
-    renderer = MitsubaRenderer(scene=box_folder, backend="scalar", buffer_samples=1, patch_size=16)
+    renderer = MitsubaRenderer(
+        scene=read_scene(box_folder), backend="scalar", buffer_samples=1, patch_size=16
+    )
     still = renderer.render_image(V, resolution=32, samples_per_pixel=16, seed=0)
     scene = renderer._scene.scene
     camera = mi.traverse(scene.sensors()[0])
@@ -234,7 +236,9 @@ def test_furnace(tmp_path, backend, load_box) -> None:
         "variables: [{object: white, property: albedo, minimum: [0, 0, 0], maximum: [1, 1, 1]}],\n"
         "camera_path: [[0, 0, 0]], hard_frames: [[1, 1, 1]]}"
     )
-    furnace = MitsubaRenderer(scene=tmp_path, backend=backend, patch_size=4, buffer_samples=64)
+    furnace = MitsubaRenderer(
+        scene=read_scene(tmp_path), backend=backend, patch_size=4, buffer_samples=64
+    )
     assert furnace.layout.names == ("position", "normal", "outgoing", "albedo", "emission")
     image = furnace.render_image(torch.ones(3), resolution=16, samples_per_pixel=256, seed=0)
     buffers = furnace.image_buffers(torch.ones(3), resolution=16)
@@ -267,16 +271,16 @@ def test_bad_states(renderer, bad, resolution, message) -> None:
 
 def test_bad_construction(box_folder, tmp_path) -> None:
     with pytest.raises(ValueError, match="patch_size is 0"):
-        MitsubaRenderer(scene=box_folder, backend="scalar", patch_size=0)
+        MitsubaRenderer(scene=read_scene(box_folder), backend="scalar", patch_size=0)
     with pytest.raises(ValueError, match="backend 'metal': choose one of"):
-        MitsubaRenderer(scene=box_folder, backend="metal")
+        MitsubaRenderer(scene=read_scene(box_folder), backend="metal")
     shutil.copytree(box_folder, tmp_path, dirs_exist_ok=True)
     xml = (tmp_path / "scene.xml").read_text()
     (tmp_path / "scene.xml").write_text(
         xml.replace('name="width" value="32"', 'name="width" value="33"')
     )
     with pytest.raises(ValueError, match="film is 33 x 32; make width and height equal"):
-        MitsubaRenderer(scene=tmp_path, backend="scalar")
+        MitsubaRenderer(scene=read_scene(tmp_path), backend="scalar")
     (tmp_path / "scene.xml").write_text(xml.replace('type="roughplastic"', 'type="pplastic"'))
     with pytest.raises(ValueError, match="BSDF 'clay' is of kind"):
-        MitsubaRenderer(scene=tmp_path, backend="scalar")
+        MitsubaRenderer(scene=read_scene(tmp_path), backend="scalar")

@@ -8,7 +8,7 @@ import torch
 
 from ngi.backend import llvm_problem
 from ngi.render.mitsuba_renderer import MitsubaRenderer
-from ngi.resources import scene_folders
+from ngi.scene import read_scene, scenes
 
 
 @pytest.fixture
@@ -24,7 +24,7 @@ def test_scenes_can_be_rendered_in_turn() -> None:
     means: dict[str, list[float]] = {}
     for name in ("sphere-caustic", "sphere-caustic", "mirror", "sphere-caustic"):
         renderer = MitsubaRenderer(
-            scene=scene_folders()[name], backend="llvm", patch_size=8, samples_per_pixel=4
+            scene=read_scene(**scenes()[name]), backend="llvm", patch_size=8, samples_per_pixel=4
         )
         generator = torch.Generator().manual_seed(0)
         renderer.render_image(

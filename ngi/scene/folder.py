@@ -1,0 +1,142 @@
+"""Reads a scene folder: `scene.yaml` beside a stock Mitsuba 3 `scene.xml`.
+
+Everything that can be wrong in either is found here, before Mitsuba is even imported.
+"""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from ngi.resources import scene_folders
+from ngi.scene.description import SceneDescription, component_names
+from ngi.scene.kinds import KINDS
+from ngi.scene.scene_files import (
+    content_hash,
+    integrator_max_depth,
+    named_files,
+    read_scene_file,
+)
+from ngi.scene.variable import Variable
+from ngi.scene.yaml_keys import YamlKeys, load_yaml
+
+
+def read_scene(folder: Path | str, *, dimensions: int | None = None) -> SceneDescription:
+    """Reads and checks a scene folder.
+
+    dimensions: a variant that scene.yaml names: only so many components of v vary, the first ones;
+        the other variables stay as scene.xml has them.
+
+    Raises FileNotFoundError for a missing folder or file, ValueError for anything else that is
+    wrong; the message names file, key and value and says what to do.
+    """
+    folder = Path(folder)
+    path = folder / "scene.yaml"
+    if not path.is_file():
+        raise FileNotFoundError(f"{path}: no such file; a scene is a folder with a scene.yaml")
+    top = YamlKeys(path, "", load_yaml(path))
+    scene_file = folder / top.take("scene", str)
+    xml = read_scene_file(scene_file)
+    variables = _variables(top)
+    complete = len(component_names(variables))
+    variants = top.integers("variants") if "variants" in top else []
+    bounds = YamlKeys(path, "bounds.", top.take("bounds", dict))
+    low, high = (bounds.numbers(key, length=3) for key in ("minimum", "maximum"))
+    bounds.check_range(low, high, strict=True)
+    bounds.finish()
+    beside = [(name, folder / name) for variable in variables for name in variable.files]
+    for name, file in beside:
+        if not file.is_file():
+            raise FileNotFoundError(f"{path}: names '{name}', but there is no {file}; bring it")
+    contents = [("scene.yaml", path), (scene_file.name, scene_file), *named_files(xml), *beside]
+    description = SceneDescription(
+        name=top.take("name", str),
+        document=xml,
+        samples_per_pixel=top.positive_integer("samples_per_pixel"),
+        max_depth=top.positive_integer("max_depth"),
+        bounds=(low, high),
+        variables=variables,
+        camera_path=top.frames("camera_path", dimensions=complete),
+        hard_frames=top.frames("hard_frames", dimensions=complete),
+        scene_hash=content_hash(contents),
+    )
+    top.finish()
+    if (authored := integrator_max_depth(xml)) != description.max_depth:
+        raise ValueError(
+            f"{path}: max_depth is {description.max_depth}, but {authored} in the integrator of "
+            f"{scene_file}; make them equal, so that any Mitsuba renders the same picture"
+        )
+    for variant in variants:
+        _first(description, variant, path)
+    return description if dimensions is None else _first(description, dimensions, path)
+
+
+def scenes() -> dict[str, dict[str, Any]]:
+    """The scenes that are known by name: name -> arguments of `read_scene`.
+
+    A scene with variants is known by their names only. A scene.yaml that cannot be read is listed
+    all the same: what is wrong with it is said when it is asked for.
+    """
+    options: dict[str, dict[str, Any]] = {}
+    for name, folder in scene_folders().items():
+        try:
+            top = YamlKeys(folder / "scene.yaml", "", load_yaml(folder / "scene.yaml"))
+            variants = top.integers("variants") if "variants" in top else []
+        except ValueError:
+            variants = []
+        counts: list[int | None] = [*variants] if variants else [None]
+        for count in counts:
+            option = name if count is None else f"{name}-{count}"
+            options[option] = {"folder": str(folder), "dimensions": count}
+    return options
+
+
+def _first(scene: SceneDescription, dimensions: int, path: Path) -> SceneDescription:
+    """The variant of a scene in which only the first components of v vary."""
+    for count in range(len(scene.variables) + 1):
+        if len(component_names(scene.variables[:count])) == dimensions > 0:
+            return SceneDescription(
+                name=f"{scene.name}-{dimensions}",
+                document=scene.document,
+                samples_per_pixel=scene.samples_per_pixel,
+                max_depth=scene.max_depth,
+                bounds=scene.bounds,
+                variables=scene.variables[:count],
+                camera_path=tuple(v[:dimensions] for v in scene.camera_path),
+                hard_frames=tuple(v[:dimensions] for v in scene.hard_frames),
+                scene_hash=scene.scene_hash,
+            )
+    raise ValueError(
+        f"{path}: variants: {dimensions} components are no whole number of the first variables"
+    )
+
+
+def _variables(top: YamlKeys) -> tuple[Variable, ...]:
+    entries = top.take("variables", list)
+    if not entries:
+        raise top.error("variables", entries, "name at least one")
+    variables = tuple(_variable(top.path, i, entry) for i, entry in enumerate(entries))
+    varied = [(name, variable.kind) for variable in variables for name in variable.objects]
+    for pair in varied:
+        if varied.count(pair) > 1 and pair[1] not in ("rotation", "scale"):
+            raise top.error("variables", ".".join(pair), "it is there twice; make it one entry")
+    names = component_names(variables)
+    if len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise top.error("variables", twice, "two components have this name")
+    return variables
+
+
+def _variable(path: Path, index: int, entry: Any) -> Variable:
+    keys = YamlKeys(path, f"variables[{index}].", entry)
+    kind = keys.take("property", str)
+    if kind not in KINDS:
+        near = get_close_matches(kind, KINDS, n=1)
+        meant = f" (did you mean '{near[0]}'?)" if near else ""
+        raise keys.error("property", kind, f"choose one of {list(KINDS)}{meant}")
+    variable = KINDS[kind].read(keys.names("object", at_least=1), keys)
+    if not variable.components:
+        raise keys.error("maximum", entry["maximum"], "it equals minimum, so that nothing varies")
+    keys.finish()
+    return variable
