@@ -8,6 +8,7 @@ variables v, then the two coordinates of the patch position (paper, Sec. 4 and 5
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
 from typing import Self
 
@@ -24,10 +25,20 @@ BUFFER_CHANNELS = {
 }
 """Every first-intersection buffer of the paper (Sec. 4.2) and its channels, in storage order."""
 
+CHAIN_CHANNELS = {"throughput": 3, "chain_roughness": 1}
+"""Buffers of the specular bounces where those are traced (paper, Fig. 10)."""
+
+_STORED = {
+    **{name: count for name, count in BUFFER_CHANNELS.items() if name != "emission"},
+    **CHAIN_CHANNELS,
+    "emission": BUFFER_CHANNELS["emission"],
+}
+"""All of them in storage order: emission is the last."""
+
 
 @dataclass(frozen=True)
 class BufferLayout:
-    """Which first-intersection buffers a scene carries, in the order of `BUFFER_CHANNELS`.
+    """Which buffers a scene carries, in storage order; by default those of the first hit.
 
     A scene in which a buffer can only be constant does not carry it. `position` is always there.
 
@@ -36,23 +47,26 @@ class BufferLayout:
     - outgoing: direction from the surface towards the camera, world space, in [-1, 1]
     - albedo: diffuse or specular reflectance, linear RGB in [0, 1]
     - roughness: GGX/Beckmann alpha; 0 for a perfectly smooth BSDF, 1 for a diffuse one
+    - throughput: what the specular bounces before the surface let through, linear RGB from 0 up,
+      1 where there is none
+    - chain_roughness: sqrt(sum of alpha^2) over these bounces
     - emission: log1p of the emitted radiance, linear RGB
     """
 
     names: tuple[str, ...] = tuple(BUFFER_CHANNELS)
 
     def __post_init__(self) -> None:
-        expected = tuple(name for name in BUFFER_CHANNELS if name in self.names)
+        expected = tuple(name for name in _STORED if name in self.names)
         if self.names != expected or "position" not in self.names:
             raise ValueError(
                 f"buffers {list(self.names)}: expected 'position' and a selection of "
-                f"{list(BUFFER_CHANNELS)} in that order"
+                f"{list(_STORED)} in that order"
             )
 
     @property
     def channels(self) -> int:
         """Number of channels of all buffers, emission included."""
-        return sum(BUFFER_CHANNELS[name] for name in self.names)
+        return sum(_STORED[name] for name in self.names)
 
     @property
     def input_channels(self) -> int:
@@ -67,8 +81,13 @@ class BufferLayout:
         for other in self.names:
             if other == name:
                 break
-            start += BUFFER_CHANNELS[other]
-        return slice(start, start + BUFFER_CHANNELS[name])
+            start += _STORED[other]
+        return slice(start, start + _STORED[name])
+
+    def adding(self, names: Iterable[str]) -> BufferLayout:
+        """The layout that carries these buffers too."""
+        together = {*self.names, *names}
+        return BufferLayout(tuple(name for name in _STORED if name in together))
 
 
 @dataclass(frozen=True)

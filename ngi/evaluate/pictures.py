@@ -45,8 +45,8 @@ def write_pictures(
     """
     folder.mkdir(parents=True, exist_ok=True)
     pictures = {
-        "prediction": _srgb_picture(prediction, exposure),
-        "reference": _srgb_picture(reference, exposure),
+        "prediction": srgb_picture(prediction, exposure),
+        "reference": srgb_picture(reference, exposure),
         "error": Image.fromarray(error_picture(prediction, reference, epsilon)),
     }
     scale = PngInfo()
@@ -71,7 +71,8 @@ def error_picture(prediction: Tensor, reference: Tensor, epsilon: float) -> np.n
     return coloured
 
 
-def _srgb_picture(radiance: Tensor, exposure: float) -> Image.Image:
+def srgb_picture(radiance: Tensor, exposure: float) -> Image.Image:
+    """Linear radiance [H, W, 3] as a picture; non-finite pixels in cyan."""
     picture = tone_map(radiance, exposure).cpu()
     eight_bit = (picture.nan_to_num() * 255).round().to(torch.uint8).numpy()
     eight_bit[picture.isnan().any(dim=-1).numpy()] = NON_FINITE

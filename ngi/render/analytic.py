@@ -134,6 +134,8 @@ class AnalyticRenderer:
             "outgoing": outgoing,
             "albedo": albedo.expand_as(point),
             "roughness": roughness.expand_as(distance),
+            "throughput": torch.ones_like(point),
+            "chain_roughness": torch.zeros_like(distance),
             "emission": torch.log1p(lamp),
         }
         return torch.cat([buffers[name] for name in self.layout.names], -1), radiance

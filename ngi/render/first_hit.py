@@ -7,8 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ngi.backend import dr, mi
-from ngi.patches import BUFFER_CHANNELS, BufferLayout
+from ngi.patches import BufferLayout
+from ngi.render.emission import emission
 from ngi.render.materials import Material, collect_materials, evaluate_materials
+from ngi.render.needs import buffer_needs, complete_layout, needed_layout
+from ngi.render.specular import SpecularChain, specular_chain
 from ngi.scene.variable_scene import VariableScene
 
 
@@ -23,11 +26,21 @@ class FirstHit:
     layout: BufferLayout
     materials: list[Material]
     bounds: tuple[tuple[float, ...], tuple[float, ...]]
+    chain: SpecularChain | None
 
     def channels(self, scene: mi.Scene, ray: mi.Ray3f) -> list[mi.Float]:
         """One value per channel and ray; a ray that misses gives zeros, but the environment's
-        emission.
+        emission and the throughput.
         """
+        traced: dict[str, list[mi.Float]] = {}
+        if self.chain is not None:
+            end = self.chain.follow(scene, ray)
+            ray = end.ray
+            traced = {
+                "throughput": list(end.throughput),
+                "chain_roughness": [end.roughness],
+                "emission": list(end.emission),
+            }
         hit = scene.ray_intersect(ray)
         valid = hit.is_valid()
         low, high = map(np.array, self.bounds)
@@ -42,42 +55,27 @@ class FirstHit:
         }
         channels = []
         for name in self.layout.names:
-            if name == "emission":
-                channels += _emission(scene, hit)
+            if name in traced:
+                channels += traced[name]
+            elif name == "emission":
+                channels += list(emission(scene, hit))
             else:
                 channels += [dr.select(valid, c, mi.Float(0)) for c in buffers[name]]
         return channels
 
 
-def first_hit_of(scene: VariableScene) -> FirstHit:
-    """The first-hit buffers that a scene needs; ValueError for a BSDF of an unknown kind."""
+def first_hit_of(scene: VariableScene, *, needed_only: bool, trace_specular: bool) -> FirstHit:
+    """The buffers that a scene needs, or all; ValueError for a BSDF of an unknown kind.
+
+    trace_specular: those of the first hit that is not specular (paper, Fig. 10).
+    """
     materials = collect_materials(scene.bsdfs())
+    needs = buffer_needs(scene, materials)
+    layout = needed_layout(needs) if needed_only else complete_layout()
+    chain = specular_chain(scene, materials) if trace_specular else None
     return FirstHit(
-        layout=_needed_buffers(scene, materials),
+        layout=layout if chain is None else layout.adding(chain.buffers),
         materials=materials,
         bounds=scene.description.bounds,
+        chain=chain,
     )
-
-
-def _needed_buffers(scene: VariableScene, materials: list[Material]) -> BufferLayout:
-    """All buffers but those that can only be constant.
-
-    Roughness: constant where every BSDF has the same one and no variable changes it. Emission:
-    constant zero where no shape emits and there is no environment.
-    """
-    left_out = set()
-    varied = {name for variable in scene.description.variables for name in variable.affects}
-    roughness = {material.constant_roughness for material in materials}
-    if len(roughness) == 1 and None not in roughness and "roughness" not in varied:
-        left_out.add("roughness")
-    if not any(shape.is_emitter() for shape in scene.shapes) and not scene.scene.environment():
-        left_out.add("emission")
-    return BufferLayout(tuple(name for name in BUFFER_CHANNELS if name not in left_out))
-
-
-def _emission(scene: mi.Scene, hit: mi.SurfaceInteraction3f) -> list[mi.Float]:
-    """Linear radiance emitted towards the camera, the environment's where the ray misses."""
-    emitter = hit.emitter(scene)
-    if emitter is None:  # in a scalar variant
-        return [mi.Float(0)] * 3
-    return list(mi.Color3f(emitter.eval(hit)))

@@ -26,13 +26,14 @@ class Material:
 
     albedo: diffuse, specular or base reflectance, linear RGB; 1 where the BSDF absorbs nothing.
     roughness: alpha; 1 for a diffuse BSDF and 0 for a perfectly smooth one.
-    constant_roughness: its value where it is the same everywhere, else None.
+    constant_roughness, constant_albedo: the value where it is the same everywhere, else None.
     """
 
     bsdf: mi.BSDF
     albedo: Lookup
     roughness: Lookup
     constant_roughness: float | None
+    constant_albedo: tuple[float, ...] | None
 
 
 def collect_materials(bsdfs: list[mi.BSDF]) -> list[Material]:
@@ -50,19 +51,25 @@ def evaluate_materials(
             return albedo, roughness
         material = next(material for material in materials if material.bsdf == hit.bsdf())
         return material.albedo(hit, True), material.roughness(hit, True)
-    pointer = hit.bsdf()
     for material in materials:
-        here = active & (pointer == mi.BSDFPtr(material.bsdf))
+        here = has_bsdf(hit, material.bsdf, active)
         albedo = dr.select(here, material.albedo(hit, here), albedo)
         roughness = dr.select(here, material.roughness(hit, here), roughness)
     return albedo, roughness
 
 
+def has_bsdf(hit: mi.SurfaceInteraction3f, bsdf: mi.BSDF, active: mi.Bool) -> mi.Bool:
+    """Whether an active hit is on this BSDF."""
+    if mi.variant().startswith("scalar"):
+        return active and hit.bsdf() == bsdf  # asking a miss for its BSDF would crash
+    return active & (hit.bsdf() == mi.BSDFPtr(bsdf))
+
+
 def _material(bsdf: mi.BSDF) -> Material:
-    inner, children = bsdf, _children(bsdf)
+    inner, children = bsdf, children_of(bsdf)
     while inner.class_name() in _WRAPPERS:
         inner = children[_WRAPPERS[inner.class_name()]]
-        children = _children(inner)
+        children = children_of(inner)
     kind = inner.class_name()
     if kind not in _KINDS:
         raise ValueError(
@@ -71,10 +78,11 @@ def _material(bsdf: mi.BSDF) -> Material:
         )
     albedo_name, roughness_of = _KINDS[kind]
     roughness, constant = roughness_of(inner, children)
-    return Material(bsdf, _colour(children.get(albedo_name)), roughness, constant)
+    texture = children.get(albedo_name)
+    return Material(bsdf, colour(texture), roughness, constant, _constant_colour(texture))
 
 
-def _children(bsdf: mi.BSDF) -> dict[str, mi.Object]:
+def children_of(bsdf: mi.BSDF) -> dict[str, mi.Object]:
     """The BSDFs and textures directly inside a BSDF, by parameter name."""
     children = {}
 
@@ -87,10 +95,20 @@ def _children(bsdf: mi.BSDF) -> dict[str, mi.Object]:
     return children
 
 
-def _colour(texture: mi.Texture | None) -> Lookup:
+def colour(texture: mi.Texture | None) -> Lookup:
+    """Of a texture, or white where there is none."""
     if texture is None:
         return lambda _hit, _active: mi.Color3f(1)
     return lambda hit, active: mi.Color3f(texture.eval(hit, active))
+
+
+def _constant_colour(texture: mi.Texture | None) -> tuple[float, ...] | None:
+    if texture is None:
+        return (1.0, 1.0, 1.0)
+    if texture.class_name() not in ("SRGBReflectanceSpectrum", "UniformSpectrum"):
+        return None
+    value = np.array(mi.traverse(texture)["value"], dtype=np.float64).reshape(-1)
+    return tuple(np.broadcast_to(value, 3).tolist())
 
 
 def _constant(value: float) -> tuple[Lookup, float | None]:

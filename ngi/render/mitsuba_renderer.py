@@ -10,6 +10,7 @@ from torch import Tensor
 from ngi.backend import activate, describe, mi
 from ngi.render.first_hit import first_hit_of
 from ngi.render.jit_tracer import JitTracer
+from ngi.render.needs import buffers_are_static
 from ngi.render.protocol import RenderedPatches
 from ngi.render.render_inputs import check_states, patch_window, require_positive
 from ngi.render.scalar_tracer import ScalarTracer
@@ -35,6 +36,10 @@ class MitsubaRenderer:
     patch_size: P, pixels along a patch's side.
     samples_per_pixel: of training patches; the scene's own number where None.
     buffer_samples: rays per pixel of the buffers; `BUFFER_SAMPLES` where None.
+    specular: 'learned': the buffers are those of the first hit; 'traced': of the first hit that is
+        not specular (paper, Fig. 10), see `ngi.render.specular`.
+    needed_only: leave out what the scene does not need: buffers that tell nothing, static buffers
+        rendered again, and most of the rebuilding of what does not move.
 
     Radiance and buffers are box-filtered, means over the pixel's square. The buffers use the same
     sub-pixel points in every pixel and no random numbers, so they do not depend on the seed. A
@@ -52,15 +57,21 @@ class MitsubaRenderer:
         patch_size: int = 32,
         samples_per_pixel: int | None = None,
         buffer_samples: int | None = None,
+        specular: str = "learned",
+        needed_only: bool = True,
     ) -> None:
         given = {"samples_per_pixel": samples_per_pixel, "buffer_samples": buffer_samples}
         require_positive(
             patch_size=patch_size, **{name: n for name, n in given.items() if n is not None}
         )
+        if specular not in ("learned", "traced"):
+            raise ValueError(f"renderer.specular '{specular}': choose 'learned' or 'traced'")
         self._variant = activate(backend)
-        self._scene = VariableScene(scene)
+        self._scene = VariableScene(scene, arrange=needed_only)
         self._require_square_film()
-        first_hit = first_hit_of(self._scene)
+        first_hit = first_hit_of(
+            self._scene, needed_only=needed_only, trace_specular=specular == "traced"
+        )
         buffer_samples = buffer_samples or BUFFER_SAMPLES[self._variant]
         self._buffer_samples = buffer_samples
         loaded = self._scene.scene
@@ -78,6 +89,8 @@ class MitsubaRenderer:
                 for frozen in (True, False)
             )
         self.layout = first_hit.layout
+        self._static = needed_only and buffers_are_static(self._scene, self.layout)
+        self._static_buffers: dict[int, NDArray[np.float32]] = {}
         self.dimensions = scene.dimensions
         self.patch_size = patch_size
         self.samples_per_pixel = samples_per_pixel or scene.samples_per_pixel
@@ -148,9 +161,7 @@ class MitsubaRenderer:
         require_positive(resolution=resolution)
         mi.set_variant(self._variant)
         self._scene.apply(scene_vector)
-        bands = _bands(resolution, self._buffer_samples)
-        buffers = np.concatenate([_masked(self._image_tracer.buffers(band)()) for band in bands])
-        return self._encode(torch.from_numpy(buffers))
+        return self._encode(torch.from_numpy(self._whole_buffers(resolution)))
 
     def hard_frames(self) -> Tensor:
         """[10, D]: the scene's hard test frames (paper, Sec. 7.2.1)."""
@@ -163,7 +174,19 @@ class MitsubaRenderer:
         self._scene.apply(state[:-2])
         number = derive_seed(seed, state.numpy().tobytes(), resolution, attempt)
         radiance = self._patch_tracer.radiance(window, samples=self.samples_per_pixel, seed=number)
-        return radiance, self._patch_tracer.buffers(window)
+        if not self._static:
+            return radiance, self._patch_tracer.buffers(window)
+        if resolution not in self._static_buffers:  # of the growing resolutions, the last one
+            self._static_buffers = {resolution: self._whole_buffers(resolution)}
+        rows = slice(window.y, window.y + window.height)
+        columns = slice(window.x, window.x + window.width)
+        buffers = self._static_buffers[resolution][rows, columns]
+        return radiance, lambda: buffers
+
+    def _whole_buffers(self, resolution: int) -> NDArray[np.float32]:
+        """[H, W, C] of the scene as it stands, emission linear; no NaN or Inf."""
+        bands = _bands(resolution, self._buffer_samples)
+        return np.concatenate([_masked(self._image_tracer.buffers(band)()) for band in bands])
 
     def _encode(self, buffers: Tensor) -> Tensor:
         """Emission becomes log1p of its mean, in place."""

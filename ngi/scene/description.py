@@ -20,7 +20,8 @@ class SceneDescription:
 
     document: the stock Mitsuba 3 file, whose names of files count from its folder.
     samples_per_pixel: of training patches.
-    max_depth: longest path in vertices, as Mitsuba counts; equal to the one in the scene file.
+    max_depth: longest path in vertices, as Mitsuba counts, -1 for no limit; equal to the one in
+        the scene file.
     bounds: minimum and maximum corner of a world-space box over the whole range of the variables,
         which normalises positions (the scene's own box moves with the variables).
     camera_path: key frames of v, each of length D. hard_frames: the test frames, likewise.
@@ -81,8 +82,13 @@ class SceneDescription:
 
 
 def component_names(variables: tuple[Variable, ...]) -> tuple[str, ...]:
+    """Object, kind and number; a second rotation of an object is its 'rotation_2'."""
+    stems = [f"{'+'.join(variable.objects)}.{variable.kind}" for variable in variables]
+    for i in reversed(range(len(stems))):
+        if earlier := stems[:i].count(stems[i]):
+            stems[i] += f"_{earlier + 1}"
     return tuple(
-        ".".join(filter(None, ("+".join(variable.objects), variable.kind, component)))
-        for variable in variables
+        ".".join(filter(None, (stem, component)))
+        for stem, variable in zip(stems, variables, strict=True)
         for component in variable.components
     )

@@ -11,6 +11,7 @@ from typing import Any
 
 from ngi.resources import scene_folders
 from ngi.scene.description import SceneDescription, component_names
+from ngi.scene.frames import HARD_FRAMES, PATH_FRAMES, spread_frames
 from ngi.scene.kinds import KINDS
 from ngi.scene.scene_files import (
     content_hash,
@@ -19,11 +20,16 @@ from ngi.scene.scene_files import (
     read_scene_file,
 )
 from ngi.scene.variable import Variable
-from ngi.scene.yaml_keys import YamlKeys, load_yaml
+from ngi.scene.yaml_keys import Vector, YamlKeys, load_yaml
+
+_SAME_THING = {"camera_path": "look_at", "texels": "texture"}
+"""Kinds that set what another kind sets."""
 
 
 def read_scene(folder: Path | str, *, dimensions: int | None = None) -> SceneDescription:
     """Reads and checks a scene folder.
+
+    Where scene.yaml gives no camera_path or hard_frames, they are spread over the hypercube.
 
     dimensions: a variant that scene.yaml names: only so many components of v vary, the first ones;
         the other variables stay as scene.xml has them.
@@ -54,11 +60,11 @@ def read_scene(folder: Path | str, *, dimensions: int | None = None) -> SceneDes
         name=top.take("name", str),
         document=xml,
         samples_per_pixel=top.positive_integer("samples_per_pixel"),
-        max_depth=top.positive_integer("max_depth"),
+        max_depth=_max_depth(top),
         bounds=(low, high),
         variables=variables,
-        camera_path=top.frames("camera_path", dimensions=complete),
-        hard_frames=top.frames("hard_frames", dimensions=complete),
+        camera_path=_frames(top, "camera_path", PATH_FRAMES, complete),
+        hard_frames=_frames(top, "hard_frames", HARD_FRAMES, complete),
         scene_hash=content_hash(contents),
     )
     top.finish()
@@ -112,12 +118,29 @@ def _first(scene: SceneDescription, dimensions: int, path: Path) -> SceneDescrip
     )
 
 
+def _max_depth(top: YamlKeys) -> int:
+    depth: int = top.take("max_depth", int)
+    if depth < 1 and depth != -1:
+        raise top.error("max_depth", depth, "expected a positive integer, or -1 for no limit")
+    return depth
+
+
+def _frames(top: YamlKeys, key: str, count: int, dimensions: int) -> tuple[Vector, ...]:
+    return (
+        top.frames(key, dimensions=dimensions) if key in top else spread_frames(count, dimensions)
+    )
+
+
 def _variables(top: YamlKeys) -> tuple[Variable, ...]:
     entries = top.take("variables", list)
     if not entries:
         raise top.error("variables", entries, "name at least one")
     variables = tuple(_variable(top.path, i, entry) for i, entry in enumerate(entries))
-    varied = [(name, variable.kind) for variable in variables for name in variable.objects]
+    varied = [
+        (name, _SAME_THING.get(variable.kind, variable.kind))
+        for variable in variables
+        for name in variable.objects
+    ]
     for pair in varied:
         if varied.count(pair) > 1 and pair[1] not in ("rotation", "scale"):
             raise top.error("variables", ".".join(pair), "it is there twice; make it one entry")

@@ -14,8 +14,8 @@ from ngi.scene.variable import Values, Write
 class Body(Protocol):
     """What a placement moves: something with a to_world, or the vertices of a mesh."""
 
-    origin: NDArray[np.float64]
-
+    @property
+    def origin(self) -> NDArray[np.float64]: ...
     def move(self, matrix: transforms.Matrix) -> None: ...
     def place(self, to_world: Values) -> None: ...
     def reshape(self, positions: Values, normals: Values | None) -> None: ...
@@ -37,7 +37,7 @@ class Placement:
 
     @property
     def origin(self) -> NDArray[np.float64]:
-        """[3]: the origin of the authored to_world; of a mesh without one, the world's."""
+        """[3]: the origin of the authored to_world."""
         return self._body.origin
 
     def step(self, *, last: bool = False) -> Write:

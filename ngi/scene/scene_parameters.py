@@ -5,28 +5,35 @@ from __future__ import annotations
 from collections.abc import Sequence
 from difflib import get_close_matches
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ngi.backend import dr, mi
+from ngi.scene.assets import Bitmap, authored_to_world, load_vertices
 from ngi.scene.placement import Placement, parking
+from ngi.scene.scene_files import SceneFile
 from ngi.scene.transforms import Matrix
 from ngi.scene.variable import Values, Write
 
-_GROUPS = ("Instance", "ShapeGroup")
+
+def has_surface(shape: mi.Shape) -> bool:
+    """Whether a ray can hit the shape itself, not only what a group or an instance holds."""
+    return not shape.class_name().startswith(("Instance", "ShapeGroup"))
 
 
 class SceneParameters:
     """The `ngi.scene.variable.LoadedScene` of a Mitsuba scene; needs its variant to be active.
 
-    scene_file: where the scene comes from, for messages and for files beside it.
+    document: what the scene was loaded from.
     size: diagonal of the scene's box.
     """
 
-    def __init__(self, scene: mi.Scene, *, scene_file: Path, size: float) -> None:
+    def __init__(self, scene: mi.Scene, *, document: SceneFile, size: float) -> None:
         self._parameters = mi.traverse(scene)
-        self._file = scene_file
+        self._document = document
+        self._file = document.path
         self._size = size
         self._found: set[str] = set()
         self._placements: dict[str, Placement] = {}
@@ -85,6 +92,15 @@ class SceneParameters:
             node = self._parameters.hierarchy[node][0]
         return node is not None
 
+    def owner(self, key: str) -> mi.Object:
+        """What a parameter belongs to."""
+        owner: mi.Object = self._parameters.properties[key][2]
+        return owner
+
+    def value(self, key: str) -> Any:
+        """The present value, as Mitsuba has it."""
+        return self._parameters[key]
+
     def read(self, key: str) -> NDArray[np.float64]:
         """The present value: [1], [3] for a colour, [n] for vertices, [4, 4] for a transform,
         [height, width, channels] for a bitmap.
@@ -104,7 +120,8 @@ class SceneParameters:
         if value.shape == (4, 4):
             new = kind(value) if mi.variant().startswith("scalar") else kind(mi.Matrix4f(value))
         elif value.ndim == 3 or value.size > 4:
-            new = kind(np.ascontiguousarray(value, dtype=np.float32))
+            numbers = np.uint8 if kind.__name__ == "TensorXu8" else np.float32
+            new = kind(np.ascontiguousarray(value, dtype=numbers))
         else:
             new = kind(*map(float, value))
         dr.make_opaque(new)
@@ -121,35 +138,48 @@ class SceneParameters:
         return self._placements[object_id]
 
     def _body(self, object_id: str, owner: mi.Object) -> _Mesh | _Transformed:
-        if isinstance(owner, mi.Mesh):
+        # Not every mi.Mesh is one of vertices: a rectangle has a to_world.
+        if isinstance(owner, mi.Mesh) and owner.class_name() != "Rectangle":
             return _Mesh(self, object_id)
         key = self.parameter(object_id, ("to_world",), hint="it has no place that could vary")
         return _Transformed(self, key)
 
-    def emission(self, object_id: str) -> tuple[Write, Write]:
-        """Functions that set the factor [1] and the colour [3] of an emitter."""
-        if object_id not in self._emissions:
-            key = self.parameter(
-                object_id,
-                ("radiance.value", "intensity.value", "irradiance.value", "scale"),
-                hint="name an emitter, or the shape that carries it, with a constant radiance",
+    def intensity(self, object_id: str) -> Write:
+        """A function that sets the factor [1] on an emitter's colour."""
+        return self._emission(object_id).set_factor
+
+    def radiance(self, object_id: str) -> Write:
+        """A function that sets an emitter's colour [3]."""
+        emission = self._emission(object_id)
+        if emission.colour.size != 3:
+            raise ValueError(
+                f"{self._file}: radiance of '{object_id}': it holds {emission.colour.size} "
+                "number(s), not a colour; give the emitter's radiance as <rgb>"
             )
-            self._emissions[object_id] = _Emission(self, key)
-        emission = self._emissions[object_id]
-        return emission.set_factor, emission.set_colour
+        return emission.set_colour
+
+    def _emission(self, object_id: str) -> _Emission:
+        key = self.parameter(
+            object_id,
+            ("radiance.value", "intensity.value", "irradiance.value", "scale"),
+            hint="name an emitter, or the shape that carries it, with a constant radiance",
+        )
+        if key not in self._emissions:  # which may be known by its own id and by its shape's
+            self._emissions[key] = _Emission(self, key)
+        return self._emissions[key]
 
     def materials(self, object_id: str, bsdfs: Sequence[str]) -> Write:
         """A function that gives a shape, or all of an instance's, the BSDF of an index [1]."""
-        owner = self.object(object_id)
+        owner = self.object(self._group_of(object_id))
         shapes = [
             shape
             for shape in self.objects(mi.Shape)
-            if self._belongs_to(shape, owner) and shape.class_name() not in _GROUPS
+            if self._belongs_to(shape, owner) and has_surface(shape)
         ]
         if not shapes:
             raise ValueError(
-                f"{self._file}: '{object_id}' has no shape of its own whose material could vary; "
-                "where instances share a group, name the group or a shape in it"
+                f"{self._file}: '{object_id}' has no shape whose material could vary; name a "
+                "shape, a group or an instance"
             )
         choices = [self.object(name) for name in bsdfs]
         for name, choice in zip(bsdfs, choices, strict=True):
@@ -164,18 +194,33 @@ class SceneParameters:
 
         return write
 
-    def image(self, path: Path) -> NDArray[np.float64]:
-        """[height, width, channels], as a bitmap texture holds it."""
-        texture = mi.load_dict({"type": "bitmap", "filename": str(path)})
-        return np.array(mi.traverse(texture)["data"], dtype=np.float64)
+    def _group_of(self, object_id: str) -> str:
+        """The group that an instance shows, which is not a part of it; other ids as they are."""
+        references = {
+            instance.get("id"): ref.get("id", "")
+            for instance in self._document.root.iterfind(".//shape[@type='instance']")
+            for ref in instance.findall("ref")
+        }
+        group = references.get(object_id)
+        if group is None:
+            return object_id
+        if len(sharing := [str(name) for name, g in references.items() if g == group]) > 1:
+            raise ValueError(
+                f"{self._file}: the instances {sharing} share the group '{group}' and its "
+                "material; name the group instead"
+            )
+        return group
 
-    def mesh(self, path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
-        """Vertex positions [n, 3] of a PLY file, and its normals where it has them."""
-        mesh = mi.load_dict({"type": "ply", "filename": str(path)})
-        parameters = mi.traverse(mesh)
-        positions = np.array(parameters["vertex_positions"], dtype=np.float64).reshape(-1, 3)
-        normals = np.array(parameters["vertex_normals"], dtype=np.float64).reshape(-1, 3)
-        return positions, normals if len(normals) else None
+    def bitmap(self, key: str) -> Bitmap:
+        return Bitmap(self, key)
+
+    def mesh(self, object_id: str, path: Path) -> tuple[Values, Values | None]:
+        """See `load_vertices`."""
+        return load_vertices(self._document, object_id, path)
+
+    def authored_to_world(self, object_id: str) -> Values:
+        """See `ngi.scene.assets`."""
+        return authored_to_world(self._document, object_id)
 
     def forget_the_rest(self) -> None:
         """Forgets what no variable asked for, since `update` visits each parameter it knows."""
@@ -216,16 +261,20 @@ class _Mesh:
 
     def __init__(self, parameters: SceneParameters, object_id: str) -> None:
         hint = "it has no vertices"
-        self._parameters = parameters
+        self._parameters, self._id = parameters, object_id
         self._keys = [
             parameters.parameter(object_id, (name,), hint=hint)
             for name in ("vertex_positions", "vertex_normals")
         ]
         self._positions, normals = (parameters.read(key).reshape(-1, 3) for key in self._keys)
         self._normals = normals if len(normals) else None
-        self.origin = np.zeros(3)
+
+    @property
+    def origin(self) -> Values:
+        return self._parameters.authored_to_world(self._id)[:3, 3]
 
     def move(self, matrix: Matrix) -> None:
+        dr.sync_thread()  # kernels that still run would trace the new vertices, or half of them
         moved = self._positions @ matrix[:3, :3].T + matrix[:3, 3]
         self._parameters.write(self._keys[0], moved.reshape(-1))
         if self._normals is not None:  # written too: else Mitsuba would make up its own
@@ -245,17 +294,12 @@ class _Emission:
 
     def __init__(self, parameters: SceneParameters, key: str) -> None:
         self._parameters, self._key = parameters, key
-        self._colour, self._factor = parameters.read(key), 1.0
+        self.colour, self._factor = parameters.read(key), 1.0
 
     def set_factor(self, factor: Values) -> None:
         self._factor = float(factor[0])
-        self._parameters.write(self._key, self._factor * self._colour)
+        self._parameters.write(self._key, self._factor * self.colour)
 
     def set_colour(self, colour: Values) -> None:
-        if colour.shape != self._colour.shape:
-            raise ValueError(
-                f"scene.yaml: {self._key} holds {self._colour.size} number(s), not a colour; give "
-                "the emitter's radiance as <rgb>"
-            )
-        self._colour = colour
+        self.colour = colour
         self.set_factor(np.array([self._factor]))

@@ -46,7 +46,7 @@ def look_at(
     forward = forward / length if length > 1e-9 else np.array([0.0, 0.0, 1.0])
     left = np.cross(up, forward)
     if np.linalg.norm(left) < 1e-6 * np.linalg.norm(up):
-        left = np.cross(np.roll(up, 1), forward)
+        left = np.cross(np.roll(np.eye(3)[np.argmax(np.abs(up))], 1), forward)
     left /= np.linalg.norm(left)
     matrix = np.eye(4)
     matrix[:3, :] = np.column_stack([left, np.cross(forward, left), forward, origin])

@@ -34,6 +34,15 @@ class Placement(Protocol):
     def reshape(self, positions: Values, normals: Values | None) -> None: ...
 
 
+class Bitmap(Protocol):
+    """A bitmap texture of a loaded scene; see `ngi.scene.assets`."""
+
+    shape: tuple[int, ...]
+
+    def load(self, path: Path) -> Values: ...
+    def stored(self, linear: Values) -> Values: ...
+
+
 class LoadedScene(Protocol):
     """What variables may do to a loaded scene; see `ngi.scene.scene_parameters`."""
 
@@ -41,10 +50,11 @@ class LoadedScene(Protocol):
     def read(self, key: str) -> Values: ...
     def write(self, key: str, value: Values) -> None: ...
     def placement(self, object_id: str) -> Placement: ...
-    def emission(self, object_id: str) -> tuple[Write, Write]: ...
+    def intensity(self, object_id: str) -> Write: ...
+    def radiance(self, object_id: str) -> Write: ...
     def materials(self, object_id: str, bsdfs: Sequence[str]) -> Write: ...
-    def image(self, path: Path) -> Values: ...
-    def mesh(self, path: Path) -> tuple[Values, Values | None]: ...
+    def bitmap(self, key: str) -> Bitmap: ...
+    def mesh(self, object_id: str, path: Path) -> tuple[Values, Values | None]: ...
     def file(self, name: str) -> Path: ...
 
 
@@ -92,6 +102,11 @@ class Variable(ABC):
         """From the keys of its entry in scene.yaml; ValueError for what is wrong with them."""
 
     @property
+    @abstractmethod
+    def range(self) -> str:
+        """What it varies between, for people."""
+
+    @property
     def files(self) -> tuple[str, ...]:
         """Files that it needs beside those that scene.xml names."""
         return ()
@@ -116,10 +131,9 @@ class RangedVariable(Variable):
 
     @property
     def components(self) -> tuple[str, ...]:
-        if self.linked:
-            return ("",)
         ranges = zip(self.numbers, self.minimum, self.maximum, strict=True)
-        return tuple(name for name, low, high in ranges if low != high)
+        varied = tuple(name for name, low, high in ranges if low != high)
+        return ("",) if self.linked and varied else varied
 
     def value(self, components: Values) -> Values:
         """Number by number: minimum + u * (maximum - minimum)."""
@@ -129,6 +143,13 @@ class RangedVariable(Variable):
         value = low.copy()
         value[low != high] += components * (high - low)[low != high]
         return value
+
+    @property
+    def range(self) -> str:
+        low, high = (
+            ", ".join(f"{number:.4g}" for number in end) for end in (self.minimum, self.maximum)
+        )
+        return f"{low} ... {high}"
 
     def bind(self, scene: LoadedScene) -> Write:
         return in_turn([self.bind_one(scene, object_id) for object_id in self.objects])
@@ -171,6 +192,10 @@ class DiscreteVariable(Variable):
     def value(self, components: Values) -> Values:
         """[1]: the index min(floor(u * n), n - 1)."""
         return np.minimum(np.floor(components * len(self.choices)), len(self.choices) - 1)
+
+    @property
+    def range(self) -> str:
+        return " | ".join(self.choices)
 
     @classmethod
     def read(cls, objects: tuple[str, ...], keys: YamlKeys) -> Self:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ngi.backend import mi
+from ngi.scene.arrangement import arranged, moving
 from ngi.scene.description import SceneDescription
 from ngi.scene.kinds import Material
 from ngi.scene.loading import load
-from ngi.scene.scene_parameters import SceneParameters
+from ngi.scene.scene_parameters import SceneParameters, has_surface
 
 
 class VariableScene:
@@ -17,14 +20,19 @@ class VariableScene:
 
     The Mitsuba variant that is active at construction must be active at every later call. Raises
     ValueError where scene.yaml names an object or property that scene.xml does not have.
+
+    arrange: put what never moves behind one instance, see `ngi.scene.arrangement`.
     """
 
-    def __init__(self, description: SceneDescription) -> None:
+    def __init__(self, description: SceneDescription, *, arrange: bool = True) -> None:
         self.description = description
-        self.scene: mi.Scene = load(description.document)
+        document = description.document
+        if arrange:
+            document = arranged(document, description.variables)
+        self.scene: mi.Scene = load(document)
         self._parameters = SceneParameters(
             self.scene,
-            scene_file=description.document.path,
+            document=document,
             size=float(np.linalg.norm(np.subtract(*description.bounds))),
         )
         self.shapes: list[mi.Shape] = self._parameters.objects(mi.Shape)
@@ -32,9 +40,22 @@ class VariableScene:
         self._parameters.forget_the_rest()
         self._values: list[NDArray[np.float64] | None] = [None] * len(self._writes)
 
+    @cached_property
+    def moving(self) -> frozenset[str]:
+        """Ids of the shapes and cameras that some variable places, shows or hides."""
+        return frozenset(moving(self.description.variables))
+
+    @cached_property
+    def affected(self) -> frozenset[str]:
+        """What of the buffers differs with v: camera, position, albedo, roughness, emission."""
+        affected = {name for v in self.description.variables for name in v.affects}
+        if self.scene.sensors()[0].id() in self.moving:
+            affected.add("camera")
+        return frozenset(affected)
+
     def bsdfs(self) -> list[mi.BSDF]:
         """Every BSDF that a ray can hit at some v."""
-        shapes = [s for s in self.shapes if s.class_name() not in ("Instance", "ShapeGroup")]
+        shapes = [shape for shape in self.shapes if has_surface(shape)]
         chosen = [
             self._parameters.object(name)
             for variable in self.description.variables

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass, field
 from difflib import get_close_matches
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -73,7 +73,7 @@ class YamlKeys:
             raise ValueError(f"{self.path}: {self.prefix}{key} is missing; add it")
         self.taken.add(key)
         value = self.values[key]
-        if not isinstance(value, kind) or isinstance(value, bool):
+        if not isinstance(value, kind) or (isinstance(value, bool) and kind is not object):
             raise self.error(key, value, f"expected {kind.__name__}")
         return value
 
@@ -101,7 +101,7 @@ class YamlKeys:
 
     def integers(self, key: str) -> list[int]:
         value = self.take(key, list)
-        if not all(isinstance(entry, int) and entry > 0 for entry in value):
+        if not all(_is_finite_number(n) and isinstance(n, int) and n > 0 for n in value):
             raise self.error(key, value, "expected positive integers")
         return list(value)
 
@@ -145,4 +145,6 @@ class YamlKeys:
 
 
 def _is_finite_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return abs(value) <= sys.float_info.max  # not so for NaN, nor for integers that are too long

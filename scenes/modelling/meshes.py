@@ -267,3 +267,22 @@ def extruded(outline: Sequence[Sequence[float]], front: float, back: float) -> M
         b = (a + 1) % n
         faces += [(a, n + a, n + b), (a, n + b, b)]
     return Mesh(vertices, np.array(faces))
+
+
+def grained(mesh: Mesh, grain: str, size: float = 1.0) -> Mesh:
+    """A mesh of flat faces with texture coordinates of wood whose grain runs along an axis.
+
+    Every face gets its own corners (and no normals). v is the position along the axis `grain`
+    ("x", "y" or "z"), u the position along that other axis which the face is not perpendicular to;
+    both in units of `size` metres, the extent of the image.
+    """
+    along = "xyz".index(grain)
+    corners = mesh.vertices[mesh.faces]
+    normals = np.abs(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    normals[:, along] = -1
+    facing = np.argmax(normals, axis=1)
+    across = 3 - along - facing
+    u = np.take_along_axis(corners, across[:, None, None], axis=2)[..., 0]
+    texture = np.stack([u, corners[..., along]], axis=-1).reshape(-1, 2) / size
+    faces = np.arange(3 * len(mesh.faces)).reshape(-1, 3)
+    return Mesh(corners.reshape(-1, 3), faces, texture=texture)

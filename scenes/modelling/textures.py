@@ -74,3 +74,25 @@ def save_jpeg(path: Path, image: np.ndarray, *, shrink: int = 1, quality: int = 
     picture = Image.fromarray(np.clip(image, 0, 255).astype(np.uint8))
     size = (picture.width // shrink, picture.height // shrink)
     picture.resize(size, Image.Resampling.BOX).save(path, quality=quality)
+
+
+def planed_wood(
+    extent: tuple[float, float],
+    size: tuple[int, int],
+    colour: np.ndarray = WALNUT,
+    board: float = 0.16,
+) -> np.ndarray:
+    """Glued boards with the grain along y, [height, width, 3] sRGB in 0 to 255.
+
+    extent: metres along x and y; size: pixels along x and y; board: width in metres.
+    """
+    x, y = pixel_grid(extent, size)
+    number = np.floor(x / board).astype(np.int64)
+    tone = hash_noise(number, np.full_like(number, 11))
+    bow = fractal_noise(x * 5 + 40 * tone, y * 0.8 + 90 * tone)
+    rings = np.sin(2 * np.pi * (x * 14 + 7 * bow)) * np.sin(np.pi * bow)
+    fibre = fractal_noise(x * 240 + 70 * tone, y * 6)
+    pores = value_noise(x * 420, y * 22 + 30 * tone) > 0.86
+    brightness = 0.86 + 0.2 * tone + 0.09 * rings + 0.26 * (fibre - 0.5) - 0.1 * pores
+    warmth = 1 + np.array([0.0, 0.03, 0.05]) * rings[..., None]
+    return colour * brightness[..., None] * warmth

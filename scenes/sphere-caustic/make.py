@@ -11,10 +11,16 @@ Lengths are metres; the room spans x in [-1, 1], y in [0, 2], z in [-1, 3].
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
 import numpy as np
 from PIL import Image
+
+sys.path.append(str(Path(__file__).parents[1]))
+
+from modelling.meshes import Mesh, box, write_ply
+from modelling.textures import hash_noise, value_noise
 
 ROOM_MINIMUM = np.array([-1.0, 0.0, -1.0])
 ROOM_MAXIMUM = np.array([1.0, 2.0, 3.0])
@@ -24,24 +30,6 @@ PLANK_CELLS = 5  # a plank is this many times as long as it is wide
 GAP = 0.035  # half the gap between planks, in plank widths
 
 OAK = np.array([176.0, 132.0, 88.0])  # sRGB
-
-
-def hash_noise(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """A number in [0, 1) for every pair of integers; the same on every machine."""
-    bits = x.astype(np.uint32) * np.uint32(0x9E3779B1) ^ y.astype(np.uint32) * np.uint32(0x85EBCA77)
-    bits = (bits ^ bits >> np.uint32(15)) * np.uint32(0x2C1B3C6D)
-    bits = (bits ^ bits >> np.uint32(12)) * np.uint32(0x297A2D39)
-    return (bits ^ bits >> np.uint32(15)).astype(np.float64) / 2.0**32
-
-
-def value_noise(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Smoothly interpolated `hash_noise`, in [0, 1)."""
-    column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
-    s, t = x - column, y - row
-    s, t = s * s * (3 - 2 * s), t * t * (3 - 2 * t)
-    near = hash_noise(column, row) * (1 - s) + hash_noise(column + 1, row) * s
-    far = hash_noise(column, row + 1) * (1 - s) + hash_noise(column + 1, row + 1) * s
-    return near * (1 - t) + far * t
 
 
 def parquet(width: int, height: int) -> np.ndarray:
@@ -75,23 +63,7 @@ def parquet(width: int, height: int) -> np.ndarray:
     return np.clip(OAK * brightness[..., None] * tint, 0, 255).astype(np.uint8)
 
 
-def box(minimum: tuple[float, ...], maximum: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Corners [8, 3] and outward triangles [12, 3] of an axis-aligned box."""
-    corners = np.array([minimum, maximum])
-    vertices = np.array(
-        [
-            [corners[a, 0], corners[b, 1], corners[c, 2]]
-            for a in (0, 1)
-            for b in (0, 1)
-            for c in (0, 1)
-        ]
-    )
-    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    faces = np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))])
-    return vertices, faces
-
-
-def wall_strip(bottom: float, top: float, depth: float) -> list[tuple[np.ndarray, np.ndarray]]:
+def wall_strip(bottom: float, top: float, depth: float) -> list[Mesh]:
     """A board of the given depth along all four walls."""
     (x0, _, z0), (x1, _, z1) = ROOM_MINIMUM, ROOM_MAXIMUM
     return [
@@ -102,9 +74,7 @@ def wall_strip(bottom: float, top: float, depth: float) -> list[tuple[np.ndarray
     ]
 
 
-def wall_panel(
-    left: float, right: float, bottom: float, top: float
-) -> list[tuple[np.ndarray, np.ndarray]]:
+def wall_panel(left: float, right: float, bottom: float, top: float) -> list[Mesh]:
     """A moulding in the shape of a rectangular frame on the back wall."""
     width, depth = 0.028, 0.016
     back, front = ROOM_MINIMUM[2], ROOM_MINIMUM[2] + depth
@@ -114,21 +84,6 @@ def wall_panel(
         box((left, bottom + width, back), (left + width, top - width, front)),
         box((right - width, bottom + width, back), (right, top - width, front)),
     ]
-
-
-def write_ply(path: Path, parts: list[tuple[np.ndarray, np.ndarray]]) -> None:
-    """Writes all parts as one binary mesh; Mitsuba computes its face normals."""
-    counts = np.cumsum([0] + [len(vertices) for vertices, _ in parts])
-    vertices = np.concatenate([vertices for vertices, _ in parts]).astype("<f4")
-    triangles = np.concatenate([f + n for (_, f), n in zip(parts, counts[:-1], strict=True)])
-    faces = np.empty(len(triangles), dtype=[("count", "u1"), ("index", "<i4", 3)])
-    faces["count"], faces["index"] = 3, triangles
-    header = (
-        "ply\nformat binary_little_endian 1.0\n"
-        f"element vertex {len(vertices)}\nproperty float x\nproperty float y\nproperty float z\n"
-        f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"
-    )
-    path.write_bytes(header.encode() + vertices.tobytes() + faces.tobytes())
 
 
 def make(folder: Path) -> None:

@@ -54,7 +54,7 @@ def truth():
 
 @pytest.fixture(scope="module", params=["llvm", "scalar"])
 def image(request, load_box):
-    renderer = load_box(request.param, buffer_samples=1, patch_size=16)
+    renderer = load_box(request.param, buffer_samples=1, patch_size=16, needed_only=False)
     buffers = renderer.image_buffers(V, resolution=RESOLUTION).numpy()
     return {name: buffers[..., renderer.layout.slice(name)] for name in renderer.layout.names}
 

@@ -77,8 +77,7 @@ class Intensity(RangedVariable):
     limits = (0.0, inf)
 
     def bind_one(self, scene: LoadedScene, object_id: str) -> Write:
-        factor, _ = scene.emission(object_id)
-        return factor
+        return scene.intensity(object_id)
 
 
 @dataclass(frozen=True)
@@ -91,8 +90,7 @@ class Radiance(RangedVariable):
     limits = (0.0, inf)
 
     def bind_one(self, scene: LoadedScene, object_id: str) -> Write:
-        _, colour = scene.emission(object_id)
-        return colour
+        return scene.radiance(object_id)
 
 
 @dataclass(frozen=True)
@@ -108,19 +106,12 @@ class Texture(DiscreteVariable):
 
     def bind(self, scene: LoadedScene) -> Write:
         keys = [_bitmap(scene, object_id) for object_id in self.objects]
-        images = [scene.image(scene.file(name)) for name in self.choices]
-        for key in keys:
-            authored = scene.read(key).shape
-            for name, image in zip(self.choices, images, strict=True):
-                if image.shape != authored:
-                    raise ValueError(
-                        f"{scene.file(name)}: an image of {_size(image.shape)}, but the bitmap "
-                        f"{key} of scene.xml has {_size(authored)}; make them equal"
-                    )
+        files = [scene.file(name) for name in self.choices]
+        images = {key: [scene.bitmap(key).load(file) for file in files] for key in keys}
 
         def write(value: Values) -> None:
             for key in keys:
-                scene.write(key, images[int(value[0])])
+                scene.write(key, images[key][int(value[0])])
 
         return write
 
@@ -150,22 +141,26 @@ class Texels(Variable):
     def components(self) -> tuple[str, ...]:
         return self._names
 
+    @property
+    def range(self) -> str:
+        return f"{self.size[0]} x {self.size[1]} texels, {self.minimum:g} ... {self.maximum:g}"
+
     def value(self, components: Values) -> Values:
         return (self.minimum + components * (self.maximum - self.minimum)).reshape(self.size)
 
     def bind(self, scene: LoadedScene) -> Write:
         keys = [_bitmap(scene, object_id) for object_id in self.objects]
-        shapes = [scene.read(key).shape for key in keys]
-        for key, shape in zip(keys, shapes, strict=True):
-            if shape[:2] != self.size:
+        bitmaps = {key: scene.bitmap(key) for key in keys}
+        for key, bitmap in bitmaps.items():
+            if bitmap.shape[:2] != self.size:
                 raise ValueError(
                     f"scene.yaml: texels of size {list(self.size)}, but the bitmap {key} of "
-                    f"scene.xml has {list(shape[:2])} rows and columns; make them equal"
+                    f"scene.xml has {list(bitmap.shape[:2])} rows and columns; make them equal"
                 )
 
         def write(value: Values) -> None:
-            for key, shape in zip(keys, shapes, strict=True):
-                scene.write(key, np.broadcast_to(value[..., None], shape))
+            for key, bitmap in bitmaps.items():
+                scene.write(key, np.broadcast_to(bitmap.stored(value)[..., None], bitmap.shape))
 
         return write
 
@@ -175,9 +170,10 @@ class Texels(Variable):
         if min(rows, columns) < 1 or rows % 1 or columns % 1:
             raise keys.error("size", [rows, columns], "expected two positive integers")
         (low,), (high,) = (keys.numbers(key, length=1) for key in ("minimum", "maximum"))
-        keys.check_range((low,), (high,))
-        if not 0 <= low < high <= 1:
-            raise keys.error("maximum", high, "texels lie between 0 and 1")
+        for key, value in (("minimum", low), ("maximum", high)):
+            if not 0 <= value <= 1:
+                raise keys.error(key, value, "texels lie between 0 and 1")
+        keys.check_range((low,), (high,), strict=True)
         return cls(objects, (int(rows), int(columns)), low, high)
 
 
@@ -198,7 +194,3 @@ def _bitmap(scene: LoadedScene, object_id: str) -> str:
         tuple(f"{name}.data" for name in _REFLECTANCES),
         hint="name a BSDF whose reflectance is one bitmap",
     )
-
-
-def _size(shape: tuple[int, ...]) -> str:
-    return f"{shape[1]} x {shape[0]} pixels and {shape[2]} channel(s)"

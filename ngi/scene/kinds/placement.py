@@ -144,6 +144,10 @@ class KeyFrames(Variable):
         return ("",)
 
     @property
+    def range(self) -> str:
+        return " ... ".join(self.frames)
+
+    @property
     def files(self) -> tuple[str, ...]:
         return self.frames
 
@@ -154,15 +158,7 @@ class KeyFrames(Variable):
     def bind(self, scene: LoadedScene) -> Write:
         (object_id,) = self.objects
         placement = scene.placement(object_id)
-        meshes = [scene.mesh(scene.file(name)) for name in self.frames]
-        for name, (positions, normals) in zip(self.frames, meshes, strict=True):
-            first, first_normals = meshes[0]
-            if positions.shape != first.shape or (normals is None) != (first_normals is None):
-                raise ValueError(
-                    f"{scene.file(name)}: {len(positions)} vertices, but {len(first)} in "
-                    f"{self.frames[0]}; key frames need the same vertices in the same order, and "
-                    "all or none of them normals"
-                )
+        meshes = [scene.mesh(object_id, scene.file(name)) for name in self.frames]
 
         def write(place: Values) -> None:
             before = min(int(place[0]), len(meshes) - 2)

@@ -37,7 +37,12 @@ class LookAt(RangedVariable):
 
     @classmethod
     def read_options(cls, objects: tuple[str, ...], keys: YamlKeys) -> dict[str, Any]:  # noqa: ARG003
-        return {"up": keys.numbers("up", length=3) if "up" in keys else UP}
+        if "up" not in keys:
+            return {"up": UP}
+        up = keys.numbers("up", length=3)
+        if not any(up):
+            raise keys.error("up", list(up), "give a direction, such as [0, 1, 0]")
+        return {"up": up}
 
 
 @dataclass(frozen=True)
@@ -57,6 +62,10 @@ class CameraPath(Variable):
     @property
     def components(self) -> tuple[str, ...]:
         return ("",)
+
+    @property
+    def range(self) -> str:
+        return f"{len(self.keys)} views"
 
     def value(self, components: Values) -> Values:
         """[6]: the view there."""

@@ -1,0 +1,121 @@
+"""What a specular BSDF does to a ray that meets it: one direction, and one weight.
+
+The same physics as Mitsuba's BSDFs, but where those would choose between reflection and refraction
+at random, the stronger one is taken; a slightly rough BSDF is taken for a smooth one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ngi.backend import dr, mi
+from ngi.render.materials import Material, children_of, colour
+
+Bounce = Callable[..., tuple[Any, Any]]
+"""(hit: SurfaceInteraction3f, active: Bool) -> direction in the hit's shading frame: Vector3f, and
+weight of the radiance that comes from there: Color3f."""
+
+
+@dataclass(frozen=True)
+class SpecularSurface:
+    """A BSDF that is specular where its roughness is small.
+
+    two_sided: whether it acts on rays from behind too; if not, it is black to them.
+    """
+
+    material: Material
+    bounce: Bounce
+    two_sided: bool
+
+
+def specular_surface(material: Material) -> SpecularSurface | None:
+    """None for what has no single direction: diffuse and plastic BSDFs, bump and normal maps."""
+    bsdf, two_sided = material.bsdf, False
+    if bsdf.class_name() == "TwoSidedBRDF":
+        sides = children_of(bsdf)
+        bsdf = sides["brdf_0"]
+        two_sided = sides.get("brdf_1", bsdf) == bsdf
+    kind = bsdf.class_name()
+    if kind in ("SmoothConductor", "RoughConductor"):
+        return SpecularSurface(material, _conductor(bsdf), two_sided)
+    if kind in _DIELECTRICS:
+        return SpecularSurface(material, _DIELECTRICS[kind](bsdf), two_sided=True)
+    return None
+
+
+def _conductor(bsdf: mi.BSDF) -> Bounce:
+    children = children_of(bsdf)
+    reflectance = colour(children.get("specular_reflectance"))
+    index, absorption = colour(children["eta"]), colour(children["k"])
+
+    def bounce(hit: mi.SurfaceInteraction3f, active: mi.Bool) -> tuple[mi.Vector3f, mi.Color3f]:
+        cosine = dr.abs(mi.Frame3f.cos_theta(hit.wi))
+        channels = zip(index(hit, active), absorption(hit, active), strict=True)
+        fresnel = [mi.fresnel_conductor(cosine, mi.Complex2f(n, k)) for n, k in channels]
+        return mi.reflect(hit.wi), mi.Color3f(*fresnel) * reflectance(hit, active)
+
+    return bounce
+
+
+def _dielectric(bsdf: mi.BSDF) -> Bounce:
+    """Reflection or refraction, whichever is stronger.
+
+    Refraction scales the radiance by the square of the relative index, as in Mitsuba: entering and
+    leaving a body cancel.
+    """
+
+    def branches(hit: mi.SurfaceInteraction3f) -> tuple[mi.Float, mi.Vector3f, mi.Float]:
+        cosine = mi.Frame3f.cos_theta(hit.wi)
+        reflected, refracted_cosine, _, ratio = mi.fresnel(cosine, index)
+        return reflected, mi.refract(hit.wi, refracted_cosine, ratio), dr.square(ratio)
+
+    index = _index(bsdf)
+    return _stronger(bsdf, branches)
+
+
+def _thin_dielectric(bsdf: mi.BSDF) -> Bounce:
+    """Reflection, with all that goes to and fro inside the sheet, or straight on."""
+
+    def branches(hit: mi.SurfaceInteraction3f) -> tuple[mi.Float, mi.Vector3f, mi.Float]:
+        reflected = mi.fresnel(dr.abs(mi.Frame3f.cos_theta(hit.wi)), index)[0]
+        return 2 * reflected / (1 + reflected), -hit.wi, mi.Float(1)
+
+    index = _index(bsdf)
+    return _stronger(bsdf, branches)
+
+
+def _stronger(
+    bsdf: mi.BSDF,
+    branches: Callable[[mi.SurfaceInteraction3f], tuple[mi.Float, mi.Vector3f, mi.Float]],
+) -> Bounce:
+    """branches: hit -> reflected share, direction of what passes, factor on its radiance."""
+    children = children_of(bsdf)
+    reflectance = colour(children.get("specular_reflectance"))
+    transmittance = colour(children.get("specular_transmittance"))
+
+    def bounce(hit: mi.SurfaceInteraction3f, active: mi.Bool) -> tuple[mi.Vector3f, mi.Color3f]:
+        share, passing, factor = branches(hit)
+        reflects = share > 0.5
+        return dr.select(reflects, mi.reflect(hit.wi), passing), dr.select(
+            reflects,
+            share * reflectance(hit, active),
+            (1 - share) * factor * transmittance(hit, active),
+        )
+
+    return bounce
+
+
+def _index(bsdf: mi.BSDF) -> float:
+    """Refractive index of the inside relative to the outside; no variable changes it."""
+    return float(np.ravel(mi.traverse(bsdf)["eta"])[0])
+
+
+_DIELECTRICS: dict[str, Callable[[mi.BSDF], Bounce]] = {
+    "SmoothDielectric": _dielectric,
+    "RoughDielectric": _dielectric,
+    "ThinDielectric": _thin_dielectric,
+}

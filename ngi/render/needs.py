@@ -1,0 +1,104 @@
+"""What a scene needs of the first-hit buffers: the rest is not rendered, stored or fed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ngi.backend import mi
+from ngi.patches import BUFFER_CHANNELS, BufferLayout
+from ngi.render.materials import Material
+from ngi.scene.variable_scene import VariableScene
+
+
+@dataclass(frozen=True)
+class BufferNeed:
+    """Whether a scene carries a buffer, and why (not)."""
+
+    buffer: str
+    needed: bool
+    why: str
+
+
+def buffer_needs(scene: VariableScene, materials: list[Material]) -> list[BufferNeed]:
+    """For every buffer of the paper whether it can tell the network anything in this scene.
+
+    A buffer is left out if over the whole hypercube it is constant, or follows from another one.
+    """
+    return [
+        BufferNeed("position", True, "the network's first layers see it alone"),
+        BufferNeed("normal", True, "surfaces differ in it"),
+        _outgoing(scene),
+        _albedo(scene, materials),
+        _roughness(scene, materials),
+        _emission(scene),
+    ]
+
+
+def needed_layout(needs: list[BufferNeed]) -> BufferLayout:
+    return BufferLayout(tuple(need.buffer for need in needs if need.needed))
+
+
+def complete_layout() -> BufferLayout:
+    return BufferLayout(tuple(BUFFER_CHANNELS))
+
+
+def buffers_are_static(scene: VariableScene, layout: BufferLayout) -> bool:
+    """Whether these buffers of a pixel are the same for every v."""
+    return not scene.affected & {"camera", "position", *layout.names}
+
+
+def _outgoing(scene: VariableScene) -> BufferNeed:
+    if "camera" in scene.affected:
+        return BufferNeed("outgoing", True, "the camera moves")
+    return BufferNeed("outgoing", False, "the camera is fixed, so it follows from the position")
+
+
+def _albedo(scene: VariableScene, materials: list[Material]) -> BufferNeed:
+    if "albedo" in scene.affected:
+        return BufferNeed("albedo", True, "a variable changes it")
+    values = {material.constant_albedo for material in materials}
+    if len(values) > 1 or None in values:
+        return BufferNeed("albedo", True, "surfaces differ in it")
+    return BufferNeed("albedo", False, f"it is {values.pop()} everywhere")
+
+
+def _roughness(scene: VariableScene, materials: list[Material]) -> BufferNeed:
+    if "roughness" in scene.affected:
+        return BufferNeed("roughness", True, "a variable changes it")
+    values = {material.constant_roughness for material in materials}
+    if len(values) > 1 or None in values:
+        return BufferNeed("roughness", True, "surfaces differ in it")
+    return BufferNeed("roughness", False, f"it is {values.pop()} everywhere")
+
+
+def _emission(scene: VariableScene) -> BufferNeed:
+    emitting = [shape for shape in scene.shapes if shape.is_emitter()]
+    if scene.scene.environment() is not None:
+        return BufferNeed("emission", True, "the environment emits")
+    if not emitting:
+        return BufferNeed("emission", False, "no surface emits")
+    if "camera" in scene.affected:
+        return BufferNeed("emission", True, "the camera moves and could see an emitter")
+    still = [shape for shape in emitting if shape.id() not in scene.moving]
+    if len(still) == len(emitting) and not any(_in_view(scene.scene, s) for s in still):
+        return BufferNeed("emission", False, "all emitters lie outside of the camera's view")
+    return BufferNeed("emission", True, "an emitter may be in view")
+
+
+def _in_view(scene: mi.Scene, shape: mi.Shape) -> bool:
+    """Whether the shape's box reaches into the view of the perspective camera."""
+    sensor = mi.traverse(scene.sensors()[0])
+    corners = np.array(
+        [[float(np.ravel(shape.bbox().corner(i)[axis])[0]) for axis in range(3)] for i in range(8)]
+    )
+    to_world = np.array(sensor["to_world"].matrix, dtype=np.float64).reshape(4, 4)
+    x, y, z = np.linalg.inv(to_world)[:3] @ np.column_stack([corners, np.ones(8)]).T
+    shift_x, shift_y = (
+        abs(float(np.ravel(sensor[f"principal_point_offset_{axis}"])[0])) for axis in "xy"
+    )
+    half = np.tan(np.radians(float(np.ravel(sensor["x_fov"])[0])) / 2)
+    wide, high = half * (1 + 2 * shift_x), half * (1 + 2 * shift_y)
+    planes = [z, wide * z - x, wide * z + x, high * z - y, high * z + y]
+    return not any((distance < 0).all() for distance in planes)

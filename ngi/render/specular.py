@@ -1,0 +1,140 @@
+"""Specular bounces traced in the buffers: what a mirror or a window shows (paper, Fig. 10).
+
+"When ray tracing hardware is available our method benefits by tracing all specular bounces during
+the buffer generation": the network then learns the non-specular shading of what is seen there. A
+camera ray goes on in one direction, the one that most of the light comes from; Mitsuba's own path
+tracer would choose one at random.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ngi.backend import dr, mi
+from ngi.render.bounces import SpecularSurface, specular_surface
+from ngi.render.emission import emission
+from ngi.render.materials import Material, collect_materials, has_bsdf
+from ngi.scene.variable_scene import VariableScene
+
+SPECULAR_ROUGHNESS = 0.05
+"""Alpha up to which a conductor or dielectric is followed, in its mean direction."""
+
+MAX_SPECULAR_BOUNCES = 12
+"""After so many bounces the last hit counts, whatever it is."""
+
+
+@dataclass(frozen=True)
+class ChainEnd:
+    """Where specular bounces have led.
+
+    ray: the last segment, still to be intersected.
+    throughput: product of the weights of the bounces, 1 where there was none.
+    roughness: sqrt(sum of alpha^2) over the bounces.
+    emission: linear radiance of every emitter on the way, the environment included, times the
+        throughput up to it.
+    """
+
+    ray: mi.Ray3f
+    throughput: mi.Color3f
+    roughness: mi.Float
+    emission: mi.Color3f
+
+
+@dataclass(frozen=True)
+class SpecularChain:
+    """Follows camera rays through the specular surfaces of a scene.
+
+    surfaces: at least one. maximum_bounces: at least 1.
+    buffers: those that the scene carries because of them. Once there are bounces, the position
+        does not tell the outgoing direction any more, nor does the camera's view what is seen.
+    """
+
+    surfaces: list[SpecularSurface]
+    maximum_bounces: int
+    buffers: tuple[str, ...]
+
+    def follow(self, scene: mi.Scene, ray: mi.Ray3f) -> ChainEnd:
+        """A loop in the kernel, or in Python where the variant is scalar."""
+
+        def step(
+            ray: mi.Ray3f,
+            throughput: mi.Color3f,
+            variance: mi.Float,
+            emitted: mi.Color3f,
+            bounces: mi.UInt32,
+            active: mi.Bool,
+        ) -> tuple[mi.Ray3f, mi.Color3f, mi.Float, mi.Color3f, mi.UInt32, mi.Bool]:
+            hit = scene.ray_intersect(ray, active)
+            emitted = emitted + throughput * emission(scene, hit)
+            active = active & hit.is_valid() & (bounces < self.maximum_bounces)
+            goes_on, direction, weight, alpha = self._bounce(hit, active)
+            return (
+                dr.select(goes_on, hit.spawn_ray(hit.to_world(direction)), ray),
+                dr.select(goes_on, throughput * weight, throughput),
+                dr.select(goes_on, variance + dr.square(alpha), variance),
+                emitted,
+                bounces + 1,
+                goes_on,
+            )
+
+        ray, throughput, variance, emitted, _, _ = dr.while_loop(
+            state=(
+                mi.Ray3f(ray),
+                mi.Color3f(1),
+                mi.Float(0),
+                mi.Color3f(0),
+                mi.UInt32(0),
+                mi.Bool(True),
+            ),
+            cond=lambda *state: state[-1],
+            body=step,
+        )
+        return ChainEnd(ray, throughput, dr.sqrt(variance), emitted)
+
+    def _bounce(
+        self, hit: mi.SurfaceInteraction3f, active: mi.Bool
+    ) -> tuple[mi.Bool, mi.Vector3f, mi.Color3f, mi.Float]:
+        """Whether the ray goes on, its direction, weight and alpha."""
+        goes_on, direction = mi.Bool(False), mi.Vector3f(0)
+        weight, alpha = mi.Color3f(0), mi.Float(0)
+        for surface in self.surfaces:
+            here = active & has_bsdf(hit, surface.material.bsdf, active)
+            if not surface.two_sided:
+                here = here & (mi.Frame3f.cos_theta(hit.wi) > 0)
+            roughness = surface.material.roughness(hit, here)
+            here = here & (roughness <= SPECULAR_ROUGHNESS)
+            towards, factor = surface.bounce(hit, here)
+            goes_on = goes_on | here
+            direction = dr.select(here, towards, direction)
+            weight = dr.select(here, factor, weight)
+            alpha = dr.select(here, roughness, alpha)
+        return goes_on, direction, weight, alpha
+
+
+def specular_chain(scene: VariableScene, materials: list[Material]) -> SpecularChain | None:
+    """The chains of a scene, or None where nothing in it is specular at any v.
+
+    No longer than the scene's paths: what lies beyond them emits nothing in its pictures. Leaves
+    the scene at v = 0.
+    """
+    scene.apply(np.zeros(scene.description.dimensions))  # every roughness at its minimum
+    lowest = [m.constant_roughness for m in collect_materials([m.bsdf for m in materials])]
+    surfaces = [
+        surface
+        for material, roughness in zip(materials, lowest, strict=True)
+        if (roughness is None or roughness <= SPECULAR_ROUGHNESS)
+        and (surface := specular_surface(material)) is not None
+    ]
+    bounces, longest_path = MAX_SPECULAR_BOUNCES, scene.description.max_depth
+    if longest_path >= 0:  # -1: no limit
+        bounces = min(bounces, longest_path - 1)
+    if not surfaces or bounces < 1:
+        return None
+    buffers = ["outgoing", "throughput"]
+    if any(surface.material.constant_roughness != 0 for surface in surfaces):
+        buffers.append("chain_roughness")
+    if scene.scene.environment() or any(shape.is_emitter() for shape in scene.shapes):
+        buffers.append("emission")
+    return SpecularChain(surfaces, bounces, tuple(buffers))

@@ -1,0 +1,80 @@
+"""Arranges a scene's shapes so that moving one of them costs as little as Mitsuba lets it.
+
+When any shape changes, Mitsuba rebuilds the acceleration structure over all shapes at the top
+level, with Embree at its highest quality. What never moves is therefore put behind one instance:
+Mitsuba 3.9 rebuilds that one's structure too where Embree traces, but about five times faster. A
+mesh that moves as a whole becomes an instance, so that its vertices are never rewritten.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from xml.etree import ElementTree
+
+from ngi.scene.kinds import KeyFrames, Rotation, Scale, Shape, Translation, Visibility
+from ngi.scene.scene_files import SceneFile
+from ngi.scene.variable import Variable
+
+_PLACED = ("instance", "shapegroup", "sphere", "rectangle", "disk", "cylinder")
+"""Shapes that have a to_world, and groups."""
+
+
+def arranged(document: SceneFile, variables: Sequence[Variable]) -> SceneFile:
+    """The same scene, arranged for these variables; as it is where no shape moves.
+
+    Emitters stay where they are: Mitsuba does not allow them in groups. Ids are kept; that of a
+    mesh that became an instance is the instance's.
+    """
+    moved = moving(variables)
+    root = copy.deepcopy(document.root)
+    shapes = root.findall("shape")
+    if not moved & {shape.get("id") for shape in shapes}:
+        return document
+    reshaped = {name for v in variables if isinstance(v, KeyFrames) for name in v.objects}
+    emitters = {emitter.get("id") for emitter in root.findall("emitter")}
+    static = ElementTree.Element("shape", type="shapegroup", id="ngi_static_group")
+    for shape in shapes:
+        name, kind = shape.get("id"), shape.get("type")
+        if _emits(shape, emitters) or kind in ("instance", "shapegroup") or name in reshaped:
+            continue
+        if name not in moved:
+            root.remove(shape)
+            static.append(shape)
+        elif kind not in _PLACED:
+            root.remove(shape)
+            shape.set("id", f"ngi_mesh_{name}")
+            group = ElementTree.SubElement(root, "shape", type="shapegroup", id=f"ngi_{name}")
+            group.append(shape)
+            instance = _add_instance(root, str(name), of=group)
+            for transform in shape.findall("transform"):  # the instance's, so that it has an origin
+                shape.remove(transform)
+                instance.append(transform)
+    if len(static):
+        root.append(static)
+        _add_instance(root, "ngi_static", of=static)
+    return SceneFile(document.path, root, document.defaults)
+
+
+def moving(variables: Sequence[Variable]) -> set[str]:
+    """Ids of what variables place, show, hide or reshape."""
+    moved: set[str] = set()
+    for variable in variables:
+        if isinstance(variable, Translation | Rotation | Scale | Visibility | KeyFrames):
+            moved.update(variable.objects)
+        elif isinstance(variable, Shape):
+            moved.update(variable.choices)
+    return moved
+
+
+def _emits(shape: ElementTree.Element, emitters: set[str | None]) -> bool:
+    references = {ref.get("id") for ref in shape.findall("ref")}
+    return shape.find("emitter") is not None or bool(references & emitters)
+
+
+def _add_instance(
+    root: ElementTree.Element, name: str, *, of: ElementTree.Element
+) -> ElementTree.Element:
+    instance = ElementTree.SubElement(root, "shape", type="instance", id=name)
+    ElementTree.SubElement(instance, "ref", id=str(of.get("id")))
+    return instance

@@ -1,0 +1,137 @@
+"""What varies, or could vary, in a scene: `python -m ngi.scene.describe SCENE`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from ngi.backend import activate
+from ngi.scene.clearance import camera_problems
+from ngi.scene.description import SceneDescription
+from ngi.scene.folder import read_scene, scenes
+from ngi.scene.scene_files import named_files, read_scene_file
+from ngi.scene.starter import candidates, starter_yaml
+from ngi.scene.variable_scene import VariableScene
+
+
+def describe_scene(description: SceneDescription) -> tuple[str, list[str]]:
+    """A text about a variable scene, and what is wrong with it."""
+    from ngi.render.materials import collect_materials
+    from ngi.render.needs import buffer_needs, buffers_are_static, needed_layout
+
+    scene = VariableScene(description)
+    lines = [
+        f"{description.name}: {description.dimensions} dimensions, {description.document.path}",
+        f"  {description.samples_per_pixel} samples per pixel, max_depth {description.max_depth}",
+        "",
+        "variables (component of v: value at 0 ... at 1):",
+    ]
+    start = 0
+    for variable in description.variables:
+        names = ["+".join(variable.objects) + "." + variable.kind, *variable.components]
+        stop = start + len(variable.components)
+        numbers = f"v[{start}]" if stop == start + 1 else f"v[{start}:{stop}]"
+        parts = ", ".join(filter(None, names[1:6])) + (", ..." if len(names) > 6 else "")
+        lines.append(
+            f"  {numbers:>9}  {names[0]}{f' ({parts})' if parts else ''}: {variable.range}"
+        )
+        start = stop
+    lines += ["", "buffers:"]
+    needs = buffer_needs(scene, collect_materials(scene.bsdfs()))
+    for need in needs:
+        lines.append(f"  {need.buffer:>9}  {'kept' if need.needed else 'left out'}: {need.why}")
+    if buffers_are_static(scene, needed_layout(needs)):
+        lines.append("  no variable changes a buffer: they are rendered once per resolution")
+    lines += ["", "geometry:", f"  {_geometry(scene)}"]
+    return "\n".join(lines), camera_problems(scene)
+
+
+def describe_file(path: Path) -> str:
+    """What could vary in a plain Mitsuba file."""
+    document = read_scene_file(path)
+    named_files(document)
+    found, nameless = candidates(document)
+    properties: dict[str, list[str]] = {}
+    for candidate in found:
+        properties.setdefault(candidate.object, []).append(candidate.property)
+    lines = [f"{path}: a plain Mitsuba scene. What can vary:"]
+    lines += [f"  {name}: {', '.join(kinds)}" for name, kinds in properties.items()]
+    if nameless:
+        lines.append(f"  and {nameless} more object(s) without an id: give them one to vary them")
+    return "\n".join(lines)
+
+
+def write_starter(path: Path) -> Path:
+    """Writes scene.yaml beside a Mitsuba file; FileExistsError where there is one."""
+    target = path.parent / "scene.yaml"
+    if target.exists():
+        raise FileExistsError(f"{target} exists; describe its folder, or delete it to start anew")
+    target.write_text(starter_yaml(read_scene_file(path), path.resolve().parent.name))
+    return target
+
+
+def _geometry(scene: VariableScene) -> str:
+    shapes = {shape.id() for shape in scene.shapes}
+    moving = sorted(scene.moving & shapes)
+    if not moving:
+        return "nothing moves: the acceleration structure is never rebuilt"
+    return f"moves: {', '.join(moving)}; everything else is behind one instance"
+
+
+def main(arguments: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(
+        prog="python -m ngi.scene.describe",
+        description="Describe a variable scene, check its camera, and say what a run leaves out; "
+        "or list what could vary in a plain Mitsuba file and write a scene.yaml to start from.",
+        epilog=f"Scenes known by name: {', '.join(sorted(scenes()))}.",
+    )
+    parser.add_argument(
+        "scene",
+        help="a scene's name or folder, a Mitsuba XML file, or a folder "
+        "with the authors' tagged scene.xml",
+    )
+    parser.add_argument("--backend", default="auto", help="auto, cuda, llvm or scalar")
+    options = parser.parse_args(arguments)
+    try:
+        activate(options.backend)
+        return _describe(options.scene)
+    except (ValueError, OSError, RuntimeError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+
+
+def _describe(name: str) -> int:
+    path = Path(name)
+    if name in scenes():
+        description = read_scene(**scenes()[name])
+    elif (path / "scene.yaml").is_file():
+        description = read_scene(path)
+    elif path.is_file() and path.suffix == ".xml" and "var_" not in path.read_text():
+        print(describe_file(path))
+        if (path.parent / "scene.yaml").exists():
+            print(f"\n{path.parent / 'scene.yaml'} is there: describe its folder {path.parent}")
+        else:
+            print(
+                f"\nwrote {write_starter(path)}; adjust it, then describe its folder {path.parent}"
+            )
+        return 0
+    elif not path.exists():
+        raise FileNotFoundError(
+            f"{name}: no such file or folder, and no scene of this name; known are "
+            f"{', '.join(sorted(scenes()))}"
+        )
+    else:
+        from ngi.scene.release import read_release
+
+        description = read_release(path)
+    text, problems = describe_scene(description)
+    print(text)
+    print("\ncamera:" + ("  in free air wherever it can be" if not problems else ""))
+    for problem in problems:
+        print(f"  error: {problem}")
+    return 1 if problems else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

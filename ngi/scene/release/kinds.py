@@ -1,0 +1,52 @@
+"""Kinds of variables that only scenes in this format have."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ngi.scene.kinds import Shape
+from ngi.scene.variable import LoadedScene, RangedVariable, Values, Write
+
+NOTHING = "nothing"
+
+
+@dataclass(frozen=True)
+class Tint(RangedVariable):
+    """Factor on the bitmap that is the reflectance of a BSDF, linear RGB."""
+
+    kind = "tint"
+    affects = frozenset({"albedo"})
+    numbers = ("r", "g", "b")
+    limits = (0.0, 1.0)
+
+    def bind_one(self, scene: LoadedScene, object_id: str) -> Write:
+        key = scene.parameter(
+            object_id,
+            tuple(f"{name}.data" for name in ("diffuse_reflectance", "reflectance")),
+            hint="only bitmaps can be tinted",
+        )
+        authored = scene.read(key)
+        if authored.shape[2] != 3:
+            raise ValueError(f"'{object_id}': a bitmap of grey values cannot be tinted")
+        return lambda colour: scene.write(key, authored * colour)
+
+
+@dataclass(frozen=True)
+class Alternatives(Shape):
+    """Which shape of a group is there, or none: the last choice, whose name is `NOTHING`.
+
+    choices: the instances that show one shape each. Emitters cannot vanish.
+    """
+
+    kind = "alternatives"
+
+    def bind(self, scene: LoadedScene) -> Write:
+        switches = [scene.placement(object_id).switch() for object_id in self.choices[:-1]]
+
+        def write(value: Values) -> None:
+            for index, switch in enumerate(switches):
+                switch(np.array([float(index == value[0])]))
+
+        return write

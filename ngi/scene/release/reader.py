@@ -1,0 +1,100 @@
+"""Reads a scene in the tagged format of the paper's released program."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+from ngi.scene.description import SceneDescription, component_names
+from ngi.scene.frames import HARD_FRAMES, PATH_FRAMES, spread_frames
+from ngi.scene.release.bsdfs import bsdf_variables, hoist
+from ngi.scene.release.geometry import Box, scene_box
+from ngi.scene.release.kinds import NOTHING, Alternatives
+from ngi.scene.release.motion import Motion, motion_of
+from ngi.scene.release.objects import Objects
+from ngi.scene.release.settings import rewrite_integrator, rewrite_sensor
+from ngi.scene.release.shapes import (
+    apply_fixed_offsets,
+    place_emitters,
+    separate_emitters,
+    split_choice,
+)
+from ngi.scene.release.source import Source, read_source
+from ngi.scene.release.tags import Tags, class_of, take_tags
+from ngi.scene.release.variables import emitter_variable, sensor_variable
+from ngi.scene.scene_files import content_hash, integrator_max_depth, named_files
+from ngi.scene.variable import Variable
+
+
+def read_release(path: Path | str) -> SceneDescription:
+    """A variable scene from the authors' own files: Mitsuba 2 XML whose elements are tagged.
+
+    path: the folder of a scene.xml, or an XML file. The scene is named after the folder.
+
+    Elements whose ids begin with 'var_' vary, in the order shapes and instances, shapegroups,
+    emitters, BSDFs, sensors, and within one of these as in the file. In memory the document becomes
+    stock Mitsuba 3. The camera's target counts from the scene's box as authored, as in the
+    released renderer; `bounds` is the box over the whole range of the variables.
+
+    The format has no test frames: `hard_frames` are ten points of a Halton sequence, always the
+    same, and `camera_path` is the first six of them.
+
+    Raises FileNotFoundError for files that are not there and ValueError, with file, line and
+    element, for anything else that is wrong.
+    """
+    path = Path(path)
+    source = read_source(path / "scene.xml" if path.is_dir() else path)
+    tags = take_tags(source)
+    if not tags:
+        raise source.error(source.root, "nothing varies: no id begins with 'var_'")
+    motions = {e: motion_of(source, e, t) for e, t in tags.items() if class_of(e) == "shape"}
+    still = scene_box(source, {})
+    low, high = scene_box(source, motions)
+    rewrite_integrator(source)
+    samples = rewrite_sensor(source)
+    variables = _rewrite(source, tags, motions, still)
+    frames = spread_frames(HARD_FRAMES, len(component_names(variables)))
+    document = source.document
+    return SceneDescription(
+        name=document.path.resolve().parent.name,
+        document=document,
+        samples_per_pixel=samples,
+        max_depth=integrator_max_depth(document),
+        bounds=(tuple(map(float, low)), tuple(map(float, high))),
+        variables=variables,
+        camera_path=frames[:PATH_FRAMES],
+        hard_frames=frames,
+        scene_hash=content_hash([(document.path.name, document.path), *named_files(document)]),
+    )
+
+
+def _rewrite(
+    source: Source, tags: dict[Element, Tags], motions: dict[Element, Motion], still: Box
+) -> tuple[Variable, ...]:
+    """Makes the document stock Mitsuba 3; returns the variables of its objects."""
+    objects = Objects(source)
+    moved = {element.attrib["id"]: motion for element, motion in motions.items()}
+    hoist(objects)
+    place_emitters(objects)
+    choices: list[Variable] = []
+    for group in (element for element in tags if class_of(element) == "shapegroup"):
+        if tags[group].count != 1:
+            message = f"num_parameters is {tags[group].count}; a group has 1, the shape shown"
+            raise source.error(group, message)
+        shown = split_choice(objects, group)
+        choices.append(Alternatives((group.attrib["id"],), (*shown, NOTHING)))
+    separate_emitters(objects)
+    apply_fixed_offsets(objects, moved)
+    variables: list[Variable] = []
+    for name, motion in moved.items():
+        variables += motion.variables(objects.ids(name))
+    variables += choices
+    for element, element_tags in tags.items():
+        match class_of(element):
+            case "emitter":
+                variables.append(emitter_variable(objects, element, element_tags))
+            case "bsdf":
+                variables += bsdf_variables(objects, element, element_tags)
+            case "sensor":
+                variables.append(sensor_variable(objects, element, element_tags, still))
+    return tuple(variables)

@@ -1,0 +1,119 @@
+"""The XML of a tagged scene file, which remembers the line of every element."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+from xml.etree.ElementTree import Element, TreeBuilder
+from xml.parsers import expat
+
+from ngi.scene.scene_files import SceneFile, file_references
+from ngi.scene.yaml_keys import Vector
+
+
+@dataclass(frozen=True)
+class Source:
+    """A parsed file; `document` is what becomes of it, `lines` where each element begins."""
+
+    document: SceneFile
+    lines: dict[Element, int]
+
+    @property
+    def root(self) -> Element:
+        return self.document.root
+
+    def error(self, element: Element, message: str) -> ValueError:
+        """A ValueError that names the file, the line and the element."""
+        place = f"{self.document.path}, line {self.lines.get(element, '?')}"
+        return ValueError(f"{place}: {shown(element)}: {message}")
+
+    def numbers(self, element: Element, attribute: str = "value") -> Vector:
+        """The numbers of an attribute, with commas or spaces between them."""
+        text = self.document.value(element, attribute)
+        try:
+            values = tuple(float(part) for part in re.split(r"[\s,]+", text.strip()))
+        except ValueError:
+            values = ()
+        if not values or not all(map(isfinite, values)):
+            raise self.error(element, f"{attribute} is '{text}'; expected numbers")
+        return values
+
+    def vector(self, element: Element, default: float = 0.0) -> Vector:
+        """[3]: from value='x, y, z', one number for all three, or attributes x, y and z."""
+        if "value" not in element.attrib:
+            axes = [name for name in "xyz" if name in element.attrib]
+            given = {name: self.number(element, name) for name in axes}
+            return tuple(given.get(name, default) for name in "xyz")
+        values = self.numbers(element)
+        if len(values) not in (1, 3):
+            raise self.error(element, f"{len(values)} numbers instead of 3")
+        return values * 3 if len(values) == 1 else values
+
+    def number(self, element: Element, attribute: str = "value") -> float:
+        values = self.numbers(element, attribute)
+        if len(values) != 1:
+            raise self.error(element, f"{attribute} holds {len(values)} numbers instead of one")
+        return values[0]
+
+    def integer(self, element: Element) -> int:
+        value = self.number(element)
+        if value % 1:
+            raise self.error(element, f"value is {value:g}; expected an integer")
+        return int(value)
+
+
+def read_source(path: Path) -> Source:
+    """Raises FileNotFoundError for no file and ValueError, with the line, for broken XML."""
+    if not path.is_file():
+        raise FileNotFoundError(f"{path}: no such scene file; scene.path names its folder or it")
+    builder, parser = TreeBuilder(), expat.ParserCreate()
+    lines: dict[Element, int] = {}
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        lines[builder.start(tag, attributes)] = parser.CurrentLineNumber
+
+    parser.StartElementHandler = start
+    parser.EndElementHandler = builder.end
+    try:
+        parser.Parse(path.read_bytes(), True)
+    except expat.ExpatError as error:
+        raise ValueError(f"{path}: not well-formed XML: {error}; correct the file there") from None
+    root = builder.close()
+    defaults = {e.get("name", ""): e.get("value", "") for e in root.iter("default")}
+    source = Source(SceneFile(path, root, defaults), lines)
+    _check(source)
+    return source
+
+
+def shown(element: Element) -> str:
+    """The element as a message shows it, for example <shape type='ply' id='var_lamp'>."""
+    names = ("type", "id", "name", "value")
+    given = [f" {name}='{element.get(name)}'" for name in names if name in element.attrib]
+    return f"<{element.tag}{''.join(given)}>"
+
+
+def _check(source: Source) -> None:
+    if source.root.tag != "scene":
+        raise source.error(source.root, "the root of a scene file is <scene>")
+    seen: dict[str, Element] = {}
+    for element in source.root.iter():
+        if element.tag == "include":
+            raise source.error(element, "put the content of that file here; tags are read in one")
+        if element.tag == "ref" or "id" not in element.attrib:
+            continue
+        if (name := element.attrib["id"]) in seen:
+            first = source.lines[seen[name]]
+            raise source.error(element, f"line {first} has this id already; make them two")
+        seen[name] = element
+    folder = source.document.path.parent
+    missing = [
+        f"{folder / name} (line {source.lines[element]})"
+        for _, element, attribute in file_references(source.document)
+        if not (folder / (name := source.document.value(element, attribute))).is_file()
+    ]
+    if missing:
+        raise FileNotFoundError(
+            f"{source.document.path}: names files that are not there: {', '.join(missing)}"
+        )

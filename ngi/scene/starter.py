@@ -1,0 +1,141 @@
+"""What could vary in a plain Mitsuba scene, and a scene.yaml to start from."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from ngi.backend import mi
+from ngi.scene.loading import load
+from ngi.scene.scene_files import SceneFile, integrator_max_depth
+
+FACTOR = ", minimum: 0.5, maximum: 2"
+_AUTOMATIC_ID = re.compile(r"^(_|object_\d|[a-z]+_0x|__)")
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A property of an object that could vary, as an entry of scene.yaml."""
+
+    object: str
+    property: str
+    entry: str
+
+
+def candidates(document: SceneFile) -> tuple[list[Candidate], int]:
+    """Everything that could vary, in the order of the file, and the number of objects that could
+    but have no id.
+    """
+    scene = load(document)
+    hierarchy = mi.traverse(scene).hierarchy
+    found: list[Candidate] = []
+    nameless = 0
+    for node, (parent, _) in hierarchy.items():
+        if isinstance(parent, mi.Shape | mi.BSDF):
+            continue  # part of a group, of a lamp or of a wrapped BSDF, which stands for it
+        entries = _entries(node, scene)
+        if not entries:
+            continue
+        if not node.id() or _AUTOMATIC_ID.match(node.id()):
+            nameless += 1
+            continue
+        for name, rest in entries.items():
+            entry = f"{{object: {node.id()}, property: {name}{rest}}}"
+            found.append(Candidate(node.id(), name, entry))
+    return found, nameless
+
+
+def starter_yaml(document: SceneFile, folder_name: str) -> str:
+    """The text of a scene.yaml: the camera or else the first candidate varies, the rest is there
+    as comments.
+    """
+    found, _ = candidates(document)
+    scene = load(document)
+    low, high = _bounds(scene)
+    active = next((c for c in found if c.property == "look_at"), found[0] if found else None)
+    if active is None:
+        raise ValueError(f"{document.path}: no object with an id can vary; give ids to its objects")
+    count = scene.sensors()[0].sampler().sample_count()
+    lines = [
+        "# What varies. Adjust the ranges, take the # away from what should vary, delete the rest.",
+        f"# Check it: python -m ngi.scene.describe {folder_name}",
+        f"name: {folder_name}",
+        f"scene: {document.path.name}",
+        f"samples_per_pixel: {count if count > 1 else 64}  # of training patches",
+        f"max_depth: {integrator_max_depth(document)}",
+        "# Everything that the camera can see, over the whole range of the variables.",
+        f"bounds: {{minimum: {_list(low)}, maximum: {_list(high)}}}",
+        "variables:",
+        *(f"  {'' if c is active else '# '}- {c.entry}" for c in found),
+        "# camera_path: key frames of v; hard_frames: ten v to test on. Left out, they are spread",
+        "# evenly over the hypercube.",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _entries(node: mi.Object, scene: mi.Scene) -> dict[str, str]:
+    """Property -> the rest of its entry, with a range to start from."""
+    if isinstance(node, mi.Sensor):
+        return {"look_at": _views(node, scene)}
+    if isinstance(node, mi.Emitter):
+        return _light(node)
+    if isinstance(node, mi.BSDF):
+        return _surface(node)
+    if not isinstance(node, mi.Shape) or node.class_name().startswith("ShapeGroup"):
+        return {}
+    step = round(float(np.linalg.norm(np.subtract(*_bounds(scene)))) / 10, 3)
+    entries = {
+        "translation": f", minimum: [{-step}, 0, {-step}], maximum: [{step}, 0, {step}]",
+        "rotation": ", axis: [0, 1, 0], minimum: -30, maximum: 30",
+        "scale": ", minimum: 0.8, maximum: 1.2",
+    }
+    return entries | ({"intensity": FACTOR} if node.is_emitter() else {"visibility": ""})
+
+
+def _light(emitter: mi.Emitter) -> dict[str, str]:
+    kind = emitter.class_name()
+    if kind == "DirectionalEmitter":
+        return {"direction": ", minimum: [0, 20], maximum: [90, 60]", "intensity": FACTOR}
+    if kind == "EnvironmentMapEmitter":
+        return {"rotation": ", axis: [0, 1, 0], minimum: 0, maximum: 360", "intensity": FACTOR}
+    return {"intensity": FACTOR}
+
+
+def _surface(bsdf: mi.BSDF) -> dict[str, str]:
+    """By the names of the BSDF's parameters, as `ngi.scene.kinds.appearance` looks for them."""
+    entries = {}
+    parameters = mi.traverse(bsdf)
+    for key in parameters.properties:
+        if re.search(r"(reflectance|base_color)\.value$", key):
+            if np.size(parameters[key]) != 3:
+                continue  # one number: authored as <spectrum>, or left out
+            entries["albedo"] = ", minimum: [0.1, 0.1, 0.1], maximum: [0.9, 0.9, 0.9]"
+        elif re.search(r"(reflectance|base_color)\.data$", key):
+            entries["texture"] = ", choices: [FIRST.jpg, SECOND.jpg]"
+        elif re.search(r"(^|\.)(alpha|alpha\.value|roughness\.value)$", key):
+            entries["roughness"] = ", minimum: 0.05, maximum: 0.5"
+    return entries
+
+
+def _views(sensor: mi.Sensor, scene: mi.Scene) -> str:
+    """A camera box of a tenth of the scene about the authored view."""
+    to_world = np.array(mi.traverse(sensor)["to_world"].matrix, dtype=np.float64).reshape(4, 4)
+    low, high = (np.array(corner) for corner in _bounds(scene))
+    distance = np.linalg.norm(high - low) / 3
+    origin, target = to_world[:3, 3], to_world[:3, 3] + distance * to_world[:3, 2]
+    reach = np.array([*(high - low) / 20, *(high - low) / 20])
+    reach[4] = 0  # the target's height stays, as in the paper's scenes
+    view = np.concatenate([origin, target])
+    up = "" if abs(to_world[1, 1]) > 0.1 else ", up: [0, 0, 1]"
+    return f", minimum: {_list(view - reach)}, maximum: {_list(view + reach)}{up}"
+
+
+def _bounds(scene: mi.Scene) -> tuple[list[float], list[float]]:
+    box = scene.bbox()
+    return [float(x) for x in np.ravel(box.min)], [float(x) for x in np.ravel(box.max)]
+
+
+def _list(values: object) -> str:
+    return "[" + ", ".join(f"{float(x):.4g}" for x in np.ravel(np.array(values))) + "]"

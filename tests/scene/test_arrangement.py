@@ -1,0 +1,119 @@
+"""Shapes that stay are put behind one instance; the picture stays the same."""
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from ngi.backend import activate, mi
+from ngi.scene import read_scene
+from ngi.scene.arrangement import arranged
+from ngi.scene.kinds import KeyFrames, Material, Shape, Translation, Visibility
+from ngi.scene.loading import load
+from ngi.scene.scene_files import SceneFile
+from ngi.scene.variable_scene import VariableScene
+
+BOX = Path(__file__).parents[1] / "render" / "scenes" / "box"
+
+XML = """<scene version="3.0.0">
+<emitter type="area" id="light"/>
+<shape type="rectangle" id="floor"/>
+<shape type="cube" id="table"><transform name="to_world"><translate y="1"/></transform></shape>
+<shape type="ply" id="curtain"/>
+<shape type="shapegroup" id="chair_group"><shape type="cube" id="seat"/></shape>
+<shape type="instance" id="chair"><ref id="chair_group"/></shape>
+<shape type="rectangle" id="lamp"><emitter type="area"/></shape>
+<shape type="sphere" id="bulb"><ref id="light"/></shape>
+</scene>"""
+
+
+def document(xml=XML):
+    return SceneFile(Path("scene.xml"), ElementTree.fromstring(xml), {})
+
+
+def top_level(scene):
+    return {(shape.get("type"), shape.get("id")) for shape in scene.root.findall("shape")}
+
+
+def move(*names):
+    return Translation(names, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("variables", [[], [Material(("floor",), ("a", "b"))], [move("camera")]])
+def test_nothing_is_arranged_where_no_shape_moves(variables) -> None:
+    scene = document()
+    assert arranged(scene, variables) is scene
+
+
+@pytest.mark.parametrize(
+    "variable", [move("chair"), Visibility(("chair",)), Shape(("any",), ("chair", "other"))]
+)
+def test_what_stays_is_one_instance_but_for_emitters(variable) -> None:
+    scene = document()
+    result = arranged(scene, [variable])
+    assert top_level(result) == {
+        ("shapegroup", "chair_group"),
+        ("instance", "chair"),
+        ("rectangle", "lamp"),
+        ("sphere", "bulb"),
+        ("shapegroup", "ngi_static_group"),
+        ("instance", "ngi_static"),
+    }
+    group = result.root.find("shape[@id='ngi_static_group']")
+    assert [shape.get("id") for shape in group] == ["floor", "table", "curtain"]
+    assert top_level(scene) == top_level(document()), "the document itself was changed"
+
+
+def test_a_mesh_that_moves_becomes_an_instance_with_its_place() -> None:
+    result = arranged(document(), [move("table")])
+    instance = result.root.find("shape[@id='table']")
+    assert instance.get("type") == "instance"
+    assert instance.find("transform/translate").get("y") == "1"
+    group = result.root.find(f"shape[@id='{instance.find('ref').get('id')}']")
+    assert [shape.get("type") for shape in group.findall("shape")] == ["cube"]
+    assert group.find("shape/transform") is None
+
+
+def test_spheres_emitters_and_key_framed_meshes_move_as_they_are() -> None:
+    frames = KeyFrames(("curtain",), ("a.ply", "b.ply"))
+    result = arranged(document(), [move("bulb"), move("lamp"), move("floor"), frames])
+    assert {
+        ("sphere", "bulb"),
+        ("rectangle", "lamp"),
+        ("rectangle", "floor"),
+        ("ply", "curtain"),
+    } <= (top_level(result))
+
+
+def test_the_picture_is_the_same() -> None:
+    activate("scalar")
+    description = read_scene(BOX)
+    plain = load(description.document)
+    moved = load(arranged(description.document, description.variables))
+    assert len(moved.shapes()) < len(plain.shapes())
+    images = [np.array(mi.render(scene, spp=4, seed=1)) for scene in (plain, moved)]
+    # A path may take another turn where rounding differs.
+    assert np.isclose(*images, rtol=1e-3, atol=1e-4).mean() > 0.99
+
+
+def test_a_moved_mesh_turns_about_its_authored_origin(tmp_path) -> None:
+    activate("scalar")
+    (tmp_path / "scene.xml").write_text(
+        """<scene version="3.0.0"><integrator type="path"><integer name="max_depth" value="3"/>
+        </integrator><sensor type="perspective" id="camera"/>
+        <shape type="cube" id="table"><transform name="to_world"><translate x="5"/></transform>
+        </shape></scene>"""
+    )
+    (tmp_path / "scene.yaml").write_text(
+        """{name: turn, scene: scene.xml, samples_per_pixel: 1, max_depth: 3,
+        bounds: {minimum: [-9, -9, -9], maximum: [9, 9, 9]}, variables: [{object: table,
+        property: rotation, axis: [0, 1, 0], minimum: 0, maximum: 90}]}"""
+    )
+    scene = VariableScene(read_scene(tmp_path))
+    scene.apply([0.5])
+    hit = scene.scene.ray_intersect(mi.Ray3f([5, 5, 0], [0, -1, 0]))
+    assert hit.t == pytest.approx(4, abs=1e-4)
+    corner = scene.scene.ray_intersect(mi.Ray3f([5 + 1.4, 5, 0], [0, -1, 0]))
+    assert corner.is_valid(), "a cube turned by 45 degrees about its middle reaches to sqrt(2)"
+    assert not scene.scene.ray_intersect(mi.Ray3f([5.95, 5, 0.95], [0, -1, 0])).is_valid()

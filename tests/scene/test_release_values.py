@@ -1,0 +1,191 @@
+"""Emitters, BSDFs and cameras of the tagged format: their values at some v."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from ngi.backend import activate, mi
+from tests.scene.release_files import BALL, ROOM, SENSOR, Loaded, read, tags
+
+LAMP = """<emitter type="area" id="var_lamp"><rgb name="radiance" value="1, 2, 3"/>{}</emitter>
+<shape type="rectangle" id="first"><ref id="var_lamp"/></shape>"""
+WALL = '<bsdf type="{}" id="var_paint">{}</bsdf><shape type="sphere"><ref id="var_paint"/></shape>'
+WHITE = '<rgb name="reflectance" value="1, 1, 1"/>'
+
+
+@pytest.fixture(autouse=True)
+def _variant():
+    activate("scalar")
+
+
+def test_order_is_shapes_then_emitters_then_bsdfs_then_sensors(tmp_path) -> None:
+    """And within a class as in the file, whatever the ids."""
+    moving = f'<shape type="sphere" id="var_{{}}">{tags(1, "0, 0, 0", "1, 0, 0")}</shape>'
+    body = WALL.format("diffuse", WHITE) + LAMP.format(tags(1)) + moving.format("z")
+    sensor = SENSOR.replace('id="camera"', 'id="var_camera"')
+    names = read(tmp_path, body + moving.format("a"), sensor=sensor).component_names
+    assert names == (
+        "var_z.translation.x",
+        "var_a.translation.x",
+        "var_lamp.radiance",
+        *(f"var_paint.albedo.{channel}" for channel in "rgb"),
+        *(f"var_camera.look_at.origin_{axis}" for axis in "xyz"),
+        "var_camera.look_at.target_x",
+        "var_camera.look_at.target_z",
+    )
+
+
+def test_emitter_with_one_parameter_moves_all_three_together(tmp_path) -> None:
+    loaded = Loaded(read(tmp_path, LAMP.format(tags(1, "10, 0, 5", "3000, 500, 0"))))
+    assert loaded.description.dimensions == 1
+    for u, expected in [(0, (10, 0, 5)), (0.5, (1510, 250, 5)), (1, (3010, 500, 5))]:
+        assert_allclose(emission(loaded, u), expected, rtol=1e-6)
+
+
+def test_emitter_with_three_parameters_has_a_colour(tmp_path) -> None:
+    loaded = Loaded(read(tmp_path, LAMP.format(tags(3, "1, 2, 3", "10, 20, 0"))))
+    value = emission(loaded, 0.5, 1, 1)
+    assert_allclose(value, (6, 22, 3), rtol=1e-6)
+
+
+def test_emitter_defaults(tmp_path) -> None:
+    loaded = Loaded(read(tmp_path, LAMP.format("")))
+    assert_allclose(emission(loaded, 0, 0.5, 1), (0, 0.5, 1))
+
+
+def test_every_shape_with_a_reference_has_the_emitter(tmp_path) -> None:
+    second = '<shape type="sphere" id="second"><ref id="var_lamp"/></shape>'
+    loaded = Loaded(read(tmp_path, LAMP.format(tags(1, "0, 0, 0", "4, 4, 4")) + second))
+    parameters = loaded.at(0.5)
+    keys = [key for key in parameters.keys() if key.endswith("radiance.value")]  # noqa: SIM118
+    assert len(keys) == 2
+    for key in keys:
+        assert_allclose(np.array(parameters[key]).reshape(-1), 2)
+
+
+@pytest.mark.parametrize("authored", ['<rgb name="radiance" value="1, 2, 3"/>', "", "spectrum"])
+def test_emission_may_be_authored_in_any_way(tmp_path, authored) -> None:
+    authored = authored.replace("spectrum", '<spectrum name="radiance" value="400:1, 700:2"/>')
+    emitter = f'<emitter type="area" id="var_lamp">{authored}{tags(3)}</emitter>'
+    lamp = f'<shape type="sphere">{emitter}</shape>'
+    loaded = Loaded(read(tmp_path, lamp))
+    assert_allclose(emission(loaded, 0.25, 0.5, 1), (0.25, 0.5, 1), atol=1e-6)
+
+
+def test_environment_turns_about_y(tmp_path) -> None:
+    """The authored to_world is replaced, as in the released renderer."""
+    mi.Bitmap(np.ones((8, 16, 3), dtype=np.float32)).write(str(tmp_path / "sky.exr"))
+    sky = """<emitter type="envmap" id="var_sky"><string name="filename" value="sky.exr"/>
+      <transform name="to_world"><rotate x="1" angle="77"/></transform></emitter>"""
+    loaded = Loaded(read(tmp_path, BALL + sky))
+    assert loaded.description.component_names == ("var_sky.rotation",)
+    for u in (0, 0.5, 1):
+        expected = mi.ScalarTransform4f().rotate([0, 1, 0], 100 + 40 * u).matrix
+        assert_allclose(loaded.matrix("var_sky.to_world", u), np.array(expected), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("kind", "authored", "key"),
+    [
+        ("diffuse", WHITE, "reflectance"),
+        ("diffuse", "", "reflectance"),
+        ("diffuse", '<spectrum name="reflectance" value="0.3"/>', "reflectance"),
+        ("roughplastic", "", "diffuse_reflectance"),
+        ("roughconductor", "", "specular_reflectance"),
+        ("twosided", f'<bsdf type="diffuse">{WHITE}</bsdf>', "reflectance"),
+    ],
+)
+def test_colour_of_a_bsdf(tmp_path, kind, authored, key) -> None:
+    body = WALL.format(kind, authored + tags(3, "0.1, 0.2, 0.3", "0.5, 0.25, 0"))
+    loaded = Loaded(read(tmp_path, body))
+    parameters = loaded.at(1, 0.5, 1)
+    (name,) = [k for k in parameters.keys() if k.endswith(f"{key}.value")]  # noqa: SIM118
+    assert_allclose(np.array(parameters[name]).reshape(-1), (0.6, 0.325, 0.3), rtol=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["roughconductor", "roughdielectric", "roughplastic"])
+@pytest.mark.parametrize("authored", ['<float name="alpha" value="0.01"/>', ""])
+def test_roughness_of_a_bsdf_is_the_fourth_number(tmp_path, kind, authored) -> None:
+    values = tags(1, "0, 0, 0, 0.01", "1, 1, 1, 0.5", kind="vector4f")
+    loaded = Loaded(read(tmp_path, WALL.format(kind, authored + values)))
+    assert loaded.description.component_names == ("var_paint.roughness",)
+    for u, alpha in [(0, 0.01), (0.5, 0.26), (1, 0.51)]:
+        parameters = loaded.at(u)
+        (name,) = [k for k in parameters.keys() if ".alpha" in k]  # noqa: SIM118
+        assert_allclose(np.array(parameters[name]).reshape(-1), alpha, rtol=1e-6)
+
+
+def test_four_parameters_of_a_rough_bsdf(tmp_path) -> None:
+    values = tags(4, "0, 0, 0, 0.5", "1, 1, 1, 0.5", kind="vector4f")
+    description = read(tmp_path, WALL.format("roughconductor", values))
+    assert description.component_names == (
+        *(f"var_paint.albedo.{channel}" for channel in "rgb"),
+        "var_paint.roughness",
+    )
+    colour, roughness = description.values([0, 0.5, 1, 0.5])
+    assert_allclose(colour, (0, 0.5, 1))
+    assert_allclose(roughness, 0.75)
+
+
+def pictures(folder) -> str:
+    """Two textures of one colour each, of different sizes, for the reflectance."""
+    elements = []
+    for name, size, colour in [("red", 4, (0.8, 0, 0)), ("green", 8, (0, 0.4, 0))]:
+        image = np.ones((size, size, 3), dtype=np.float32) * np.array(colour, dtype=np.float32)
+        mi.Bitmap(image).write(str(folder / f"{name}.exr"))
+        file = f'<string name="filename" value="{name}.exr"/>'
+        elements.append(f'<texture type="bitmap" name="reflectance">{file}</texture>')
+    return "".join(elements)
+
+
+def albedo(loaded, *v):
+    """Of the ball at the origin, by Mitsuba's own albedo."""
+    loaded.at(*v)
+    hit = loaded.scene.ray_intersect(mi.Ray3f(mi.Point3f(0, 0, 9), mi.Vector3f(0, 0, -1)))
+    return np.array(hit.bsdf().eval_diffuse_reflectance(hit)).reshape(3)
+
+
+def emission(loaded, *v):
+    loaded.at(*v)
+    return loaded.emitted((0, 0, 9), (0, 0, -1))
+
+
+WRAPPED = """<bsdf type="twosided" id="outside"><bsdf type="diffuse" id="var_paint">{}</bsdf></bsdf>
+<shape type="shapegroup" id="group"><shape type="sphere"><ref id="outside"/></shape></shape>
+<shape type="instance"><ref id="group"/></shape>"""
+
+
+@pytest.mark.parametrize("bsdf", [WALL.replace("{}", "diffuse", 1), WRAPPED])
+def test_texture_of_a_bsdf(tmp_path, bsdf) -> None:
+    loaded = Loaded(read(tmp_path, bsdf.format(pictures(tmp_path) + tags(1))))
+    assert loaded.description.dimensions == 1
+    assert_allclose(albedo(loaded, 0), (0.8, 0, 0), atol=1e-3)
+    assert_allclose(albedo(loaded, 0.4), (0.8, 0, 0), atol=1e-3)
+    assert_allclose(albedo(loaded, 0.6), (0, 0.4, 0), atol=1e-3)
+    assert_allclose(albedo(loaded, 1), (0, 0.4, 0), atol=1e-3)
+
+
+def test_colour_and_texture_of_a_bsdf(tmp_path) -> None:
+    body = WALL.format("diffuse", pictures(tmp_path) + tags(4, "0.5, 0.5, 0.5", "0.5, 0.5, 0.5"))
+    loaded = Loaded(read(tmp_path, body))
+    assert loaded.description.dimensions == 4
+    assert_allclose(albedo(loaded, 0, 0, 0, 0), (0.4, 0, 0), atol=1e-3)
+    assert_allclose(albedo(loaded, 0, 1, 0, 1), (0, 0.4, 0), atol=1e-3)
+    assert_allclose(albedo(loaded, 1, 0.5, 0, 1), (0, 0.3, 0), atol=1e-3)
+
+
+def test_camera_looks_into_the_middle_third_at_a_third_of_the_height(tmp_path) -> None:
+    """The box counts as authored: -6 to 6, though the ball moves out of it."""
+    sensor = SENSOR.replace('id="camera">', f'id="var_camera">{tags(5, "-1, 2, 3", "2, 0, 4")}')
+    ball = f'<shape type="sphere" id="var_ball">{tags(1, "0, 0, 0", "50, 0, 0")}</shape>'
+    loaded = Loaded(read(tmp_path, ROOM + ball, sensor=sensor))
+    assert loaded.description.dimensions == 6
+    corners = {
+        (0, 0, 0, 0, 0): ((-1, 2, 3), (-2, -2, -2)),
+        (1, 1, 1, 1, 1): ((1, 2, 7), (2, -2, 2)),
+        (0.5, 0, 0, 0.25, 0): ((0, 2, 3), (-1, -2, -2)),
+    }
+    for u, (origin, target) in corners.items():
+        expected = mi.ScalarTransform4f().look_at(origin, target, [0, 1, 0]).matrix
+        matrix = loaded.matrix("var_camera.to_world", 0.5, *u)
+        assert_allclose(matrix, np.array(expected), atol=1e-5)
