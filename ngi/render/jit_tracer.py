@@ -8,7 +8,10 @@ window are asked of the sensor directly. Everything that differs from window to 
 from __future__ import annotations
 
 import gc
+import logging
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +19,10 @@ from numpy.typing import NDArray
 from ngi.backend import dr, mi
 from ngi.render.first_hit import FirstHit
 from ngi.render.tracing import Pending, Window, subpixel_points
+
+Trace = Callable[..., "list[mi.Float]"]
+
+_logger = logging.getLogger(__name__)
 
 
 class JitTracer:
@@ -56,8 +63,8 @@ class JitTracer:
             channels = first_hit.channels(scene, view.rays(scene, pixel, jitter))
             return _block_sums(channels, samples)
 
-        self._radiance = dr.freeze(trace_radiance) if frozen else trace_radiance
-        self._buffers = dr.freeze(trace_buffers) if frozen else trace_buffers
+        self._radiance = _replayed(trace_radiance) if frozen else trace_radiance
+        self._buffers = _replayed(trace_buffers) if frozen else trace_buffers
         self._clean = not frozen
 
     def radiance(self, window: Window, *, samples: int, seed: int) -> Pending:
@@ -82,6 +89,27 @@ class JitTracer:
         if not self._clean:
             gc.collect()
             self._clean = True
+
+
+def _replayed(function: Trace) -> Trace:
+    """The function with its kernel launches recorded and replayed, where Dr.Jit can do that.
+
+    Dr.Jit 1.5 cannot for some scenes, those with textured area emitters among them: then Python
+    traces the function again for every patch, which costs time but compiles nothing either.
+    """
+    recorded, works = dr.freeze(function), True
+
+    def trace(*arguments: Any) -> list[mi.Float]:
+        nonlocal works
+        if works:
+            try:
+                return list(recorded(*arguments))
+            except RuntimeError as error:
+                works = False
+                _logger.warning("patches of this scene take longer: %s", error)
+        return function(*arguments)
+
+    return trace
 
 
 @dataclass(frozen=True)

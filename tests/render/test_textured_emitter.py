@@ -1,0 +1,55 @@
+"""Scenes whose kernels Dr.Jit cannot record are rendered all the same."""
+
+import logging
+
+import numpy as np
+import pytest
+import torch
+from PIL import Image
+
+from ngi.backend import llvm_problem
+from ngi.render.measure import counted_compilations
+from ngi.render.mitsuba_renderer import MitsubaRenderer
+from ngi.scene import read_scene
+
+SCENE = """<scene version="3.0.0">
+<integrator type="path"><integer name="max_depth" value="4"/></integrator>
+<sensor type="perspective" id="camera"><transform name="to_world">
+  <lookat origin="0,1,4" target="0,0.5,0" up="0,1,0"/></transform>
+  <film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="8"/></film>
+</sensor>
+<bsdf type="diffuse" id="paint"><rgb name="reflectance" value="0.5, 0.4, 0.3"/></bsdf>
+<shape type="rectangle" id="floor"><transform name="to_world"><scale value="3"/>
+  <rotate x="1" angle="-90"/></transform><ref id="paint"/></shape>
+<shape type="sphere" id="ball"><float name="radius" value="0.5"/><ref id="paint"/></shape>
+<shape type="rectangle" id="screen"><transform name="to_world"><translate y="1" z="-1"/></transform>
+  <emitter type="area"><texture type="bitmap" name="radiance">
+    <string name="filename" value="screen.png"/></texture></emitter></shape>
+</scene>"""
+
+
+@pytest.mark.skipif(llvm_problem() is not None, reason=str(llvm_problem()))
+def test_a_textured_emitter(tmp_path, caplog) -> None:
+    pixels = np.random.default_rng(0).integers(0, 255, (8, 8, 3), dtype=np.uint8)
+    Image.fromarray(pixels).save(tmp_path / "screen.png")
+    (tmp_path / "scene.xml").write_text(SCENE)
+    (tmp_path / "scene.yaml").write_text(
+        "{name: screen, scene: scene.xml, samples_per_pixel: 64, max_depth: 4,\n"
+        "bounds: {minimum: [-3, 0, -3], maximum: [3, 3, 3]}, variables: [{object: ball,\n"
+        "property: translation, minimum: [0, 0, 0], maximum: [1, 0, 0]}]}"
+    )
+    renderer = MitsubaRenderer(scene=read_scene(tmp_path), backend="llvm", patch_size=8)
+    with caplog.at_level(logging.WARNING):
+        renderer.warm_up()
+    assert "patches of this scene take longer" in caplog.text
+    caplog.clear()
+    v = torch.tensor([0.3])
+    states = torch.cat([v, torch.zeros(2)]).expand(4, 3)
+    with counted_compilations() as compiled:
+        patches = [renderer.render_patches(states, resolution=8, seed=seed) for seed in range(4)]
+    assert compiled == [0]
+    assert not caplog.text, "it is said once"
+    mean = torch.stack([p.log_radiance.expm1() for p in patches]).mean(dim=(0, 1))
+    image = renderer.render_image(v, resolution=8, samples_per_pixel=1024, seed=9)
+    assert image.max() > 0.2, "the screen is in view"
+    torch.testing.assert_close(mean, image, atol=0.02, rtol=0.1)
