@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
 from ngi.backend import dr, mi
 from ngi.scene.assets import Bitmap, authored_to_world, load_vertices
+from ngi.scene.bodies import Emission, Transformed, Vertices
 from ngi.scene.placement import Placement, parking
 from ngi.scene.scene_files import SceneFile
-from ngi.scene.transforms import Matrix
 from ngi.scene.variable import Values, Write
 
 
@@ -37,7 +38,7 @@ class SceneParameters:
         self._size = size
         self._found: set[str] = set()
         self._placements: dict[str, Placement] = {}
-        self._emissions: dict[str, _Emission] = {}
+        self._emissions: dict[str, Emission] = {}
         self._objects = {
             node.id(): node
             for node in self._parameters.hierarchy
@@ -127,6 +128,21 @@ class SceneParameters:
         dr.make_opaque(new)
         self._parameters[key] = new
 
+    def overwrite(self, key: str, value: NDArray[np.float64]) -> None:
+        """As `write`, of an array [n] that keeps its memory, as the vertices of a mesh must.
+
+        A frozen function of Dr.Jit 1.5 goes on reading them where they were when it was recorded.
+        """
+        if mi.variant().startswith("scalar"):
+            self.write(key, value)
+            return
+        dr.sync_thread()  # until no kernel is running that reads them
+        memory = torch.from_dlpack(self._parameters[key])
+        memory.copy_(torch.from_numpy(value))
+        if memory.is_cuda:
+            torch.cuda.synchronize()
+        self._parameters.set_dirty(key)
+
     def placement(self, object_id: str) -> Placement:
         """Where an object stands, the same for all variables that act on it."""
         if object_id not in self._placements:
@@ -137,12 +153,12 @@ class SceneParameters:
             )
         return self._placements[object_id]
 
-    def _body(self, object_id: str, owner: mi.Object) -> _Mesh | _Transformed:
+    def _body(self, object_id: str, owner: mi.Object) -> Vertices | Transformed:
         # Not every mi.Mesh is one of vertices: a rectangle has a to_world.
         if isinstance(owner, mi.Mesh) and owner.class_name() != "Rectangle":
-            return _Mesh(self, object_id)
+            return Vertices(self, object_id)
         key = self.parameter(object_id, ("to_world",), hint="it has no place that could vary")
-        return _Transformed(self, key)
+        return Transformed(self, key)
 
     def intensity(self, object_id: str) -> Write:
         """A function that sets the factor [1] on an emitter's colour."""
@@ -158,14 +174,14 @@ class SceneParameters:
             )
         return emission.set_colour
 
-    def _emission(self, object_id: str) -> _Emission:
+    def _emission(self, object_id: str) -> Emission:
         key = self.parameter(
             object_id,
             ("radiance.value", "intensity.value", "irradiance.value", "scale"),
             hint="name an emitter, or the shape that carries it, with a constant radiance",
         )
         if key not in self._emissions:  # which may be known by its own id and by its shape's
-            self._emissions[key] = _Emission(self, key)
+            self._emissions[key] = Emission(self, key)
         return self._emissions[key]
 
     def materials(self, object_id: str, bsdfs: Sequence[str]) -> Write:
@@ -233,73 +249,3 @@ class SceneParameters:
         for placement in self._placements.values():
             placement.flush()
         self._parameters.update()
-
-
-class _Transformed:
-    """A body with a to_world: instance, sphere, rectangle, emitter or camera."""
-
-    def __init__(self, parameters: SceneParameters, key: str) -> None:
-        self._parameters, self._key = parameters, key
-        # The authored matrix holds a sphere's radius and a rectangle's size too.
-        self._authored = parameters.read(key)
-        self.origin = self._authored[:3, 3].copy()
-
-    def move(self, matrix: Matrix) -> None:
-        self._parameters.write(self._key, matrix @ self._authored)
-
-    def place(self, to_world: Values) -> None:
-        self._authored = to_world
-
-    def reshape(self, positions: Values, normals: Values | None) -> None:  # noqa: ARG002
-        raise ValueError(
-            f"scene.yaml: {self._key}: only a mesh outside of any group has key frames"
-        )
-
-
-class _Mesh:
-    """A body of vertices, already in world space: a mesh that is no instance, such as a lamp."""
-
-    def __init__(self, parameters: SceneParameters, object_id: str) -> None:
-        hint = "it has no vertices"
-        self._parameters, self._id = parameters, object_id
-        self._keys = [
-            parameters.parameter(object_id, (name,), hint=hint)
-            for name in ("vertex_positions", "vertex_normals")
-        ]
-        self._positions, normals = (parameters.read(key).reshape(-1, 3) for key in self._keys)
-        self._normals = normals if len(normals) else None
-
-    @property
-    def origin(self) -> Values:
-        return self._parameters.authored_to_world(self._id)[:3, 3]
-
-    def move(self, matrix: Matrix) -> None:
-        dr.sync_thread()  # kernels that still run would trace the new vertices, or half of them
-        moved = self._positions @ matrix[:3, :3].T + matrix[:3, 3]
-        self._parameters.write(self._keys[0], moved.reshape(-1))
-        if self._normals is not None:  # written too: else Mitsuba would make up its own
-            normals = self._normals @ np.linalg.inv(matrix[:3, :3])
-            normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-            self._parameters.write(self._keys[1], normals.reshape(-1))
-
-    def place(self, to_world: Values) -> None:  # noqa: ARG002
-        raise ValueError(f"scene.yaml: {self._keys[0]}: a mesh cannot be placed by a matrix")
-
-    def reshape(self, positions: Values, normals: Values | None) -> None:
-        self._positions, self._normals = positions, normals
-
-
-class _Emission:
-    """Colour times factor of an emitter; either may vary."""
-
-    def __init__(self, parameters: SceneParameters, key: str) -> None:
-        self._parameters, self._key = parameters, key
-        self.colour, self._factor = parameters.read(key), 1.0
-
-    def set_factor(self, factor: Values) -> None:
-        self._factor = float(factor[0])
-        self._parameters.write(self._key, self._factor * self.colour)
-
-    def set_colour(self, colour: Values) -> None:
-        self.colour = colour
-        self.set_factor(np.array([self._factor]))

@@ -12,7 +12,7 @@ from scipy import stats
 from ngi.backend import activate, mi
 
 SCENES = Path(__file__).parent / "scenes"
-RENDERINGS = 16
+RENDERINGS = 12
 """Independent renderings of one picture, of 16 samples per pixel each."""
 
 

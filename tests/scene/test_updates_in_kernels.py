@@ -66,17 +66,16 @@ UPDATES = [
     together(
         "lamps and camera",
         test_updates_of_light_and_view.UPDATES,
-        "intensity and radiance of one emitter, light",
+        "intensity and radiance of one emitter, by its own id and its shape's",
         "look_at",
     ),
-    together("camera path", test_updates_of_light_and_view.UPDATES, "camera_path"),
     together(
-        "sun and sky",
+        "sun, sky and camera path",
         test_updates_of_light_and_view.UPDATES,
         "direction of the sun [0.25, 0.5]",
         "intensity of sun and sky",
         "rotation of the sky",
-        "look_at with another up",
+        "camera_path",
     ),
 ]
 

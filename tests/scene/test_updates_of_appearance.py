@@ -138,8 +138,7 @@ WAYS = {
     "8 bits": {},
     "raw 8 bits": {"raw": "true"},
     "floating point": {"format": "variant"},
-    "raw floating point": {"format": "variant", "raw": "true"},
-    "half precision": {"format": "fp16"},
+    "raw half precision": {"format": "fp16", "raw": "true"},
 }
 
 

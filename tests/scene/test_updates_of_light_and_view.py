@@ -36,15 +36,12 @@ LIGHTS = [
             set_value(root, name, "radiance", "1, 2, 8") for name in ("glow", "lamp")
         ],
     ),
-    *(
-        Update(
-            f"intensity and radiance of one emitter, {other}",
-            variables=[{"object": "lamp", **INTENSITY}, {"object": other, **RADIANCE}],
-            v=[0.75, 0.25, 0.5],
-            off=[0.6, 0.25, 0.5],
-            edit=with_colour("lamp", "radiance", "2, 4, 16"),
-        )
-        for other in ("lamp", "light")
+    Update(
+        "intensity and radiance of one emitter, by its own id and its shape's",
+        variables=[{"object": "lamp", **INTENSITY}, {"object": "light", **RADIANCE}],
+        v=[0.75, 0.25, 0.5],
+        off=[0.6, 0.25, 0.5],
+        edit=with_colour("lamp", "radiance", "2, 4, 16"),
     ),
     Update(
         "intensity of sun and sky",
@@ -100,7 +97,15 @@ SUN_AND_SKY = [
             off=off,
             edit=sun_from(360 * v[0], 30 + 60 * v[1]),
         )
-        for v, off in (([0.25, 0.5], [0.4, 0.5]), ([0.1, 0.1], [0.1, 0.3]), ([0, 1], [0, 0.8]))
+        for v, off in (([0.25, 0.5], [0.4, 0.5]), ([0, 1], [0, 0.8]))
+    ),
+    Update(
+        "visibility under sun and sky",
+        scene="field",
+        variables=[{"object": ["ball", "post"], "property": "visibility"}],
+        v=[0.2],
+        off=[0.8],
+        edit=lambda root: [root.remove(find(root, name)) for name in ("ball", "post")],
     ),
     Update(
         "rotation of the sun",
@@ -115,7 +120,7 @@ SUN_AND_SKY = [
             }
         ],
         v=[0.75],
-        off=[0.6],
+        off=[0.5],
         edit=moved("sun", rotate([0, 0, 1], 40)),
     ),
     Update(
@@ -181,6 +186,7 @@ VIEWS = [
     ),
     Update(
         "camera_path",
+        scene="field",
         variables=[{"object": "camera", "property": "camera_path", "keys": KEYS}],
         v=[0.5],
         off=[0.45],

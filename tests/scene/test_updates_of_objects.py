@@ -44,6 +44,7 @@ TRANSLATIONS = [
         ("an emitting rectangle", "light"),
         ("a mesh", "curtain"),
         ("an emitting mesh", "globe"),
+        ("a mesh in a group", "wedge_mesh"),
     )
 ]
 
@@ -70,7 +71,6 @@ TURNS_AND_SIZES = [
         )
         for what, object_id, origin in (
             ("an instance", "wedge", [0.5, 0.3, 0]),
-            ("a rectangle", "board", [-0.6, 1.3, 0]),
             ("an emitting rectangle", "light", [0, 2.2, 0]),
             ("an emitting mesh", "globe", [-0.6, 0.6, 0.2]),
         )
@@ -210,7 +210,7 @@ SHAPES = [
             *([translation("curtain"), {"object": "curtain", **ROTATION}] if more else []),
         ],
         v=[0.75, 0.75, 0.5, 0.25, 0.5] if more else [0.75],
-        off=[0.5, 0.75, 0.5, 0.25, 0.5] if more else [0.5],
+        off=[0.5, 0.5, 0.5, 0.25, 0.5] if more else [0.5],
         before=with_frames(name, face_normals=face_normals),
         files=lambda folder, name=name: between(name, 0.5, folder),
         edit=moved(

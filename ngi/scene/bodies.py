@@ -1,0 +1,82 @@
+"""What variables change of a loaded scene's objects: a to_world, vertices, or an emitted colour."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ngi.scene.transforms import Matrix
+from ngi.scene.variable import Values
+
+if TYPE_CHECKING:
+    from ngi.scene.scene_parameters import SceneParameters
+
+
+class Transformed:
+    """A body with a to_world: instance, sphere, rectangle, emitter or camera."""
+
+    def __init__(self, parameters: SceneParameters, key: str) -> None:
+        self._parameters, self._key = parameters, key
+        # The authored matrix holds a sphere's radius and a rectangle's size too.
+        self._authored = parameters.read(key)
+        self.origin = self._authored[:3, 3].copy()
+
+    def move(self, matrix: Matrix) -> None:
+        self._parameters.write(self._key, matrix @ self._authored)
+
+    def place(self, to_world: Values) -> None:
+        self._authored = to_world
+
+    def reshape(self, positions: Values, normals: Values | None) -> None:  # noqa: ARG002
+        raise ValueError(
+            f"scene.yaml: {self._key}: only a mesh outside of any group has key frames"
+        )
+
+
+class Vertices:
+    """A body of vertices, already in world space: a mesh that is no instance, such as a lamp."""
+
+    def __init__(self, parameters: SceneParameters, object_id: str) -> None:
+        hint = "it has no vertices"
+        self._parameters, self._id = parameters, object_id
+        self._keys = [
+            parameters.parameter(object_id, (name,), hint=hint)
+            for name in ("vertex_positions", "vertex_normals")
+        ]
+        self._positions, normals = (parameters.read(key).reshape(-1, 3) for key in self._keys)
+        self._normals = normals if len(normals) else None
+
+    @property
+    def origin(self) -> Values:
+        return self._parameters.authored_to_world(self._id)[:3, 3]
+
+    def move(self, matrix: Matrix) -> None:
+        moved = self._positions @ matrix[:3, :3].T + matrix[:3, 3]
+        self._parameters.overwrite(self._keys[0], moved.reshape(-1))
+        if self._normals is not None:  # written too: else Mitsuba would make up its own
+            normals = self._normals @ np.linalg.inv(matrix[:3, :3])
+            normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+            self._parameters.overwrite(self._keys[1], normals.reshape(-1))
+
+    def place(self, to_world: Values) -> None:  # noqa: ARG002
+        raise ValueError(f"scene.yaml: {self._keys[0]}: a mesh cannot be placed by a matrix")
+
+    def reshape(self, positions: Values, normals: Values | None) -> None:
+        self._positions, self._normals = positions, normals
+
+
+class Emission:
+    """Colour times factor of an emitter; either may vary."""
+
+    def __init__(self, parameters: SceneParameters, key: str) -> None:
+        self._parameters, self._key = parameters, key
+        self.colour, self._factor = parameters.read(key), 1.0
+
+    def set_factor(self, factor: Values) -> None:
+        self._factor = float(factor[0])
+        self._parameters.write(self._key, self._factor * self.colour)
+
+    def set_colour(self, colour: Values) -> None:
+        self.colour = colour
+        self.set_factor(np.array([self._factor]))

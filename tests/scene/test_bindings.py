@@ -1,0 +1,160 @@
+"""What scene.yaml asks of a loaded scene that cannot be done is said when it is loaded."""
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from ngi.backend import activate, mi
+from ngi.scene import read_scene
+from ngi.scene.variable_scene import VariableScene
+from tests.scene.stage import curtain, write_ply
+
+RADIANCE = {"property": "radiance", "minimum": [0, 0, 0], "maximum": [1, 1, 1]}
+ALBEDO = {"property": "albedo", "minimum": [0, 0, 0], "maximum": [1, 1, 1]}
+TURN = {"property": "rotation", "axis": [0, 1, 0], "minimum": 0, "maximum": 9}
+TEXELS = {"property": "texels", "minimum": 0, "maximum": 1}
+
+
+def key_frames(object_id, *files):
+    return {"object": object_id, "property": "key_frames", "files": list(files)}
+
+
+def material(object_id, *choices):
+    return {"object": object_id, "property": "material", "choices": list(choices)}
+
+
+def texture(*choices):
+    return {"object": "picture", "property": "texture", "choices": list(choices)}
+
+
+def second_instance(root) -> None:
+    instance = root.makeelement("shape", {"type": "instance", "id": "wedge_2"})
+    instance.append(root.makeelement("ref", {"id": "wedge_group"}))
+    root.append(instance)
+
+
+@pytest.fixture
+def load(make_scene):
+    def load_with(entry, *, scene="stage", edit=None, files=None):
+        count = np.prod(entry.get("size", 1))
+        count = 3 if entry["property"] in ("radiance", "albedo") else count
+        folder = make_scene(scene, [entry], dimensions=int(count), edit=edit)
+        if files is not None:
+            files(folder)
+        activate("scalar")
+        return VariableScene(read_scene(folder))
+
+    return load_with
+
+
+def large_image(folder) -> None:
+    Image.new("RGB", (7, 4)).save(folder / "dots.png")
+
+
+def grey_image(folder) -> None:
+    Image.new("L", (6, 4)).save(folder / "dots.png")
+
+
+def linear_image(folder) -> None:
+    activate("scalar")
+    mi.Bitmap(np.zeros((4, 6, 3), np.float32)).write(str(folder / "linear.exr"))
+
+
+def other_mesh(folder) -> None:
+    points, triangles, _ = curtain(0.1)
+    write_ply(folder / "curtain_1.ply", points, triangles[::-1])
+
+
+@pytest.mark.parametrize(
+    ("entry", "message", "arguments"),
+    [
+        (
+            {"object": "sky", **RADIANCE},
+            r"radiance of 'sky': it holds 1 number\(s\), not a colour",
+            {"scene": "field"},
+        ),
+        ({"object": "ball", **RADIANCE}, "'ball' .* name an emitter", {}),
+        ({"object": "picture", **ALBEDO}, "name a BSDF whose reflectance is given as <rgb>", {}),
+        ({"object": "paint", **TURN}, "'paint' .* it has no place that could vary", {}),
+        ({"object": "light", "property": "visibility"}, "an emitter cannot be hidden", {}),
+        ({"object": "globe", "property": "visibility"}, "an emitter cannot be hidden", {}),
+        (material("camera", "paint", "blue"), "'camera' has no shape whose material", {}),
+        (material("ball", "paint", "board"), "'board' is no BSDF, so 'ball' can't have it", {}),
+        (material("ball", "paint", "pain"), "no object has the id 'pain' .* nearest: paint", {}),
+        (
+            material("wedge", "paint", "blue"),
+            r"instances \['wedge', 'wedge_2'\] share the group 'wedge_group'.* name the group",
+            {"edit": second_instance},
+        ),
+        (
+            texture("stripes.png", "dots.png"),
+            r"dots.png: an image of 7 x 4 pixels and 3 8-bit .*has 6 x 4 pixels and 3 8-bit",
+            {"files": large_image},
+        ),
+        (
+            texture("stripes.png", "dots.png"),
+            r"dots.png: an image of 6 x 4 pixels and 1 8-bit",
+            {"files": grey_image},
+        ),
+        (
+            texture("stripes.png", "linear.exr"),
+            r"linear.exr: an image of 6 x 4 pixels and 3 (32|16)-bit",
+            {"files": linear_image},
+        ),
+        (
+            {"object": "picture", "size": [6, 4], **TEXELS},
+            r"texels of size \[6, 4\], but the bitmap picture.* has \[4, 6\] rows and columns",
+            {},
+        ),
+        ({"object": "paint", "size": [4, 6], **TEXELS}, "name a BSDF whose .* is one bitmap", {}),
+        (
+            key_frames("ball", "curtain_0.ply", "curtain_1.ply"),
+            "'ball' is not a mesh that comes from a file",
+            {},
+        ),
+        (
+            key_frames("wedge", "wedge.ply", "globe.ply"),
+            "'wedge' is not a mesh that comes from a file",
+            {},
+        ),
+        (
+            key_frames("curtain", "curtain_0.ply", "wedge.ply"),
+            "wedge.ply: its triangles are not those of the mesh 'curtain'",
+            {},
+        ),
+        (
+            key_frames("curtain", "curtain_0.ply", "curtain_1.ply"),
+            "curtain_1.ply: its triangles are not those",
+            {"files": other_mesh},
+        ),
+        (
+            key_frames("curtan", "curtain_0.ply", "curtain_1.ply"),
+            "no object has the id 'curtan' .* nearest: curtain",
+            {},
+        ),
+    ],
+)
+def test_what_cannot_vary(load, entry, message, arguments) -> None:
+    with pytest.raises(ValueError, match=message):
+        load(entry, **arguments)
+
+
+def test_frames_are_those_of_the_mesh_in_its_place(load) -> None:
+    scene = load(key_frames("curtain", "curtain_0.ply", "curtain_1.ply"))
+    scene.apply([1])
+    points, _, _ = curtain(0.6)
+    vertices = np.array(mi.traverse(scene.scene)["curtain.vertex_positions"]).reshape(-1, 3)
+    np.testing.assert_allclose(vertices, 0.8 * points + [0.1, 1, -0.5], atol=1e-6)
+
+
+def test_default_pivot_is_where_the_object_stands(load) -> None:
+    for object_id, origin in (
+        ("globe", [-0.6, 0.6, 0.2]),
+        ("light", [0, 2.2, 0]),
+        ("ball", [0, 0.4, 0]),
+        ("wedge", [0.5, 0.3, 0]),
+        ("curtain", [0.1, 1, -0.5]),
+    ):
+        scene = load({"object": object_id, **TURN})
+        placement = scene._parameters.placement(object_id)
+        np.testing.assert_allclose(placement.origin, origin, atol=1e-6)
