@@ -55,6 +55,16 @@ class Bitmap:
             linear = np.where(linear <= 0.0031308, 12.92 * linear, curve)
         return np.round(255 * linear)
 
+    def linear(self, stored: Values) -> Values:
+        """What the texture's numbers stand for: the inverse of `stored`."""
+        if self._kind.__name__ != "TensorXu8":
+            return stored
+        numbers = stored / 255
+        if self._raw:
+            return numbers
+        curve = ((np.maximum(numbers, 0.04045) + 0.055) / 1.055) ** 2.4
+        return np.where(numbers <= 0.04045, numbers / 12.92, curve)
+
 
 def authored_to_world(document: SceneFile, object_id: str) -> Values:
     """[4, 4]: of a shape that does not show it once loaded, such as a mesh."""

@@ -108,7 +108,7 @@ def _surface(bsdf: mi.BSDF) -> dict[str, str]:
     entries = {}
     parameters = mi.traverse(bsdf)
     for key in parameters.properties:
-        if re.search(r"(reflectance|base_color)\.value$", key):
+        if re.search(r"(reflectance|transmittance|base_color)\.value$", key):
             if np.size(parameters[key]) != 3:
                 continue  # one number: authored as <spectrum>, or left out
             entries["albedo"] = ", minimum: [0.1, 0.1, 0.1], maximum: [0.9, 0.9, 0.9]"

@@ -142,3 +142,18 @@ def test_same_patches_as_with_everything(scene, backend, monkeypatch) -> None:
         )
     needed.render_patches(states, resolution=24, seed=4)
     assert len(traced) == 2
+
+
+def test_the_albedo_of_glass_is_the_transmittance_that_a_variable_sets(scene) -> None:
+    glass = SCENE.replace(
+        '<shape type="sphere" id="ball"><float name="radius" value="0.5"/><ref id="paint"/>',
+        '<bsdf type="roughdielectric" id="glass"><float name="alpha" value="0.1"/>'
+        '<rgb name="specular_transmittance" value="0.9, 0.9, 0.9"/></bsdf>'
+        '<shape type="sphere" id="ball"><float name="radius" value="0.5"/><ref id="glass"/>',
+    )
+    assert glass != SCENE
+    tinted = "{object: glass, property: albedo, minimum: [0.2, 1, 1], maximum: [0.8, 1, 1]}"
+    renderer = MitsubaRenderer(scene=scene(tinted, xml=glass), backend="scalar", buffer_samples=1)
+    buffers = renderer.image_buffers(torch.tensor([0.5]), resolution=9)
+    albedo = buffers[4, 4, renderer.layout.slice("albedo")]
+    torch.testing.assert_close(albedo, torch.tensor([0.5, 1.0, 1.0]))

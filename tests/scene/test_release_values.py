@@ -174,6 +174,19 @@ def test_colour_and_texture_of_a_bsdf(tmp_path) -> None:
     assert_allclose(albedo(loaded, 1, 0.5, 0, 1), (0, 0.3, 0), atol=1e-3)
 
 
+def test_the_colour_is_a_factor_on_linear_light_where_the_texture_has_8_bits(tmp_path) -> None:
+    image = np.full((4, 4, 3), (188, 188, 188), dtype=np.uint8)  # sRGB 188 is 0.5029 linear
+    mi.Bitmap(image).write(str(tmp_path / "grey.png"))
+    texture = (
+        '<texture type="bitmap" name="reflectance"><string name="filename" value="grey.png"/>'
+        "</texture>"
+    )
+    body = WALL.format("diffuse", texture + tags(3, "0, 0, 0", "1, 1, 1"))
+    loaded = Loaded(read(tmp_path, body))
+    assert_allclose(albedo(loaded, 1, 0.5, 0), (0.5029, 0.2514, 0), atol=2e-3)
+    assert_allclose(albedo(loaded, 1, 1, 1), (0.5029, 0.5029, 0.5029), atol=2e-3)
+
+
 def test_camera_looks_into_the_middle_third_at_a_third_of_the_height(tmp_path) -> None:
     """The box counts as authored: -6 to 6, though the ball moves out of it."""
     sensor = SENSOR.replace('id="camera">', f'id="var_camera">{tags(5, "-1, 2, 3", "2, 0, 4")}')

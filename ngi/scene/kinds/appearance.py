@@ -23,6 +23,7 @@ from ngi.scene.yaml_keys import YamlKeys
 _REFLECTANCES = (
     "base_color",
     "diffuse_reflectance",
+    "specular_transmittance",
     "specular_reflectance",
     "reflectance",
 )

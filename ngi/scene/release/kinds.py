@@ -27,10 +27,11 @@ class Tint(RangedVariable):
             tuple(f"{name}.data" for name in ("diffuse_reflectance", "reflectance")),
             hint="only bitmaps can be tinted",
         )
-        authored = scene.read(key)
-        if authored.shape[2] != 3:
+        bitmap = scene.bitmap(key)
+        if bitmap.shape[2] != 3:
             raise ValueError(f"'{object_id}': a bitmap of grey values cannot be tinted")
-        return lambda colour: scene.write(key, authored * colour)
+        authored = bitmap.linear(scene.read(key))
+        return lambda colour: scene.write(key, bitmap.stored(authored * colour))
 
 
 @dataclass(frozen=True)
