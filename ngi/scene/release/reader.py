@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from hashlib import sha256
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
@@ -22,8 +23,11 @@ from ngi.scene.release.shapes import (
 from ngi.scene.release.source import Source, read_source
 from ngi.scene.release.tags import Tags, class_of, take_tags
 from ngi.scene.release.variables import emitter_variable, sensor_variable
-from ngi.scene.scene_files import content_hash, integrator_max_depth, named_files
+from ngi.scene.scene_files import SceneFile, content_hash, integrator_max_depth, named_files
 from ngi.scene.variable import Variable
+
+RULES_VERSION = 1
+"""Counts changes of how the tags are read: references of a scene read otherwise are not reused."""
 
 
 def read_release(path: Path | str) -> SceneDescription:
@@ -64,8 +68,12 @@ def read_release(path: Path | str) -> SceneDescription:
         variables=variables,
         camera_path=frames[:PATH_FRAMES],
         hard_frames=frames,
-        scene_hash=content_hash([(document.path.name, document.path), *named_files(document)]),
+        scene_hash=sha256(f"{RULES_VERSION} {_contents_hash(document)}".encode()).hexdigest(),
     )
+
+
+def _contents_hash(document: SceneFile) -> str:
+    return content_hash([(document.path.name, document.path), *named_files(document)])
 
 
 def _rewrite(
