@@ -24,14 +24,14 @@ class BufferNeed:
 def buffer_needs(scene: VariableScene, materials: list[Material]) -> list[BufferNeed]:
     """For every buffer of the paper whether it can tell the network anything in this scene.
 
-    A buffer is left out if over the whole hypercube it is constant, or follows from another one.
+    A buffer is left out if it is constant over the whole image and the whole hypercube.
     """
     return [
         BufferNeed("position", True, "the network's first layers see it alone"),
         BufferNeed("normal", True, "surfaces differ in it"),
-        _outgoing(scene),
-        _albedo(scene, materials),
-        _roughness(scene, materials),
+        BufferNeed("outgoing", True, "it differs from pixel to pixel"),
+        _of_materials(scene, "albedo", {m.constant_albedo for m in materials}),
+        _of_materials(scene, "roughness", {m.constant_roughness for m in materials}),
         _emission(scene),
     ]
 
@@ -49,28 +49,13 @@ def buffers_are_static(scene: VariableScene, layout: BufferLayout) -> bool:
     return not scene.affected & {"camera", "position", *layout.names}
 
 
-def _outgoing(scene: VariableScene) -> BufferNeed:
-    if "camera" in scene.affected:
-        return BufferNeed("outgoing", True, "the camera moves")
-    return BufferNeed("outgoing", False, "the camera is fixed, so it follows from the position")
-
-
-def _albedo(scene: VariableScene, materials: list[Material]) -> BufferNeed:
-    if "albedo" in scene.affected:
-        return BufferNeed("albedo", True, "a variable changes it")
-    values = {material.constant_albedo for material in materials}
-    if len(values) > 1 or None in values:
-        return BufferNeed("albedo", True, "surfaces differ in it")
-    return BufferNeed("albedo", False, f"it is {values.pop()} everywhere")
-
-
-def _roughness(scene: VariableScene, materials: list[Material]) -> BufferNeed:
-    if "roughness" in scene.affected:
-        return BufferNeed("roughness", True, "a variable changes it")
-    values = {material.constant_roughness for material in materials}
-    if len(values) > 1 or None in values:
-        return BufferNeed("roughness", True, "surfaces differ in it")
-    return BufferNeed("roughness", False, f"it is {values.pop()} everywhere")
+def _of_materials(scene: VariableScene, buffer: str, constants: set[object]) -> BufferNeed:
+    """constants: of every BSDF the value that the buffer has everywhere on it, or None."""
+    if buffer in scene.affected:
+        return BufferNeed(buffer, True, "a variable changes it")
+    if len(constants) > 1 or None in constants:
+        return BufferNeed(buffer, True, "surfaces differ in it")
+    return BufferNeed(buffer, False, f"it is {constants.pop()} everywhere")
 
 
 def _emission(scene: VariableScene) -> BufferNeed:

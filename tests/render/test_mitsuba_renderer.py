@@ -239,7 +239,7 @@ def test_furnace(tmp_path, backend, load_box) -> None:
     furnace = MitsubaRenderer(
         scene=read_scene(tmp_path), backend=backend, patch_size=4, buffer_samples=64
     )
-    assert furnace.layout.names == ("position", "normal", "albedo", "emission")
+    assert furnace.layout.names == ("position", "normal", "outgoing", "albedo", "emission")
     image = furnace.render_image(torch.ones(3), resolution=16, samples_per_pixel=256, seed=0)
     buffers = furnace.image_buffers(torch.ones(3), resolution=16)
     sky = (buffers[..., furnace.layout.slice("albedo")] == 0).all(-1)

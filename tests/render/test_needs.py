@@ -65,8 +65,7 @@ def left_out(description):
 def test_constant_and_absent_buffers_are_left_out(scene) -> None:
     found = needs(scene())
     assert found.keys() == BUFFER_CHANNELS.keys()
-    assert left_out(scene()) == {"outgoing", "albedo", "roughness", "emission"}
-    assert found["outgoing"].why == "the camera is fixed, so it follows from the position"
+    assert left_out(scene()) == {"albedo", "roughness", "emission"}
     assert found["albedo"].why.startswith("it is (0.5, 0.4")
     assert found["roughness"].why == "it is 1.0 everywhere"
     assert found["emission"].why == "all emitters lie outside of the camera's view"
@@ -74,13 +73,9 @@ def test_constant_and_absent_buffers_are_left_out(scene) -> None:
 
 VARIABLES = {
     "{object: camera, property: look_at, minimum: [0,0,4,0,0,0], maximum: [1,0,4,0,0,0]}": {
-        "outgoing",
-        "emission",
+        "emission"
     },
-    "{object: camera, property: translation, minimum: [0,0,0], maximum: [1,0,0]}": {
-        "outgoing",
-        "emission",
-    },
+    "{object: camera, property: translation, minimum: [0,0,0], maximum: [1,0,0]}": {"emission"},
     "{object: paint, property: albedo, minimum: [0,0,0], maximum: [1,0,0]}": {"albedo"},
     "{object: lamp, property: translation, minimum: [0,0,0], maximum: [0,0,1]}": {"emission"},
     "{object: ball, property: visibility}": set(),
@@ -89,7 +84,7 @@ VARIABLES = {
 
 @pytest.mark.parametrize("variable", VARIABLES)
 def test_what_a_variable_changes_is_kept(scene, variable) -> None:
-    always_left_out = {"outgoing", "albedo", "roughness", "emission"}
+    always_left_out = {"albedo", "roughness", "emission"}
     assert left_out(scene(variable)) == always_left_out - VARIABLES[variable]
 
 
@@ -100,7 +95,7 @@ def test_what_differs_between_surfaces_is_kept(scene) -> None:
     )
     mixed = SCENE.replace('value="0.5"/><ref id="paint"/></shape>', f'value="0.5"/>{metal}')
     assert mixed != SCENE
-    assert left_out(scene(xml=mixed)) == {"outgoing", "emission"}
+    assert left_out(scene(xml=mixed)) == {"emission"}
 
 
 def test_emitters_in_view_and_environments_are_kept(scene) -> None:

@@ -90,7 +90,7 @@ def test_a_scene_folder(capsys) -> None:
     text = capsys.readouterr().out
     assert "box: 10 dimensions" in text
     assert "v[3:6]  ball.translation (x, y, z): -0.4, -0.2, -0.4 ... 0.4, 0.6, 0.4" in text
-    assert "outgoing  left out: the camera is fixed" in text
+    assert "outgoing  kept: it differs from pixel to pixel" in text
     assert "roughness  kept: a variable changes it" in text
     assert "moves: ball, figure; everything else is behind one instance" in text
     assert "camera:  in free air" in text
