@@ -22,6 +22,9 @@ from ngi.render.tracing import Pending, Window, subpixel_points
 
 Trace = Callable[..., "list[mi.Float]"]
 
+RECORDINGS = 100
+"""From how many recordings of one function on Dr.Jit warns that something is wrong."""
+
 _logger = logging.getLogger(__name__)
 
 
@@ -97,7 +100,8 @@ def _replayed(function: Trace) -> Trace:
     Dr.Jit 1.5 cannot for some scenes, those with textured area emitters among them: then Python
     traces the function again for every patch, which costs time but compiles nothing either.
     """
-    recorded, works = dr.freeze(function), True
+    # A variable material makes a recording for every combination of the choices.
+    recorded, works = dr.freeze(function, warn_after=RECORDINGS), True
 
     def trace(*arguments: Any) -> list[mi.Float]:
         nonlocal works
