@@ -98,3 +98,10 @@ def test_a_scene_is_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setenv("NGI_SCENES", str(tmp_path))
     assert scene_folders()["mine"] == tmp_path / "mine"
     assert composed("scene=mine").scene.reader.folder == str(tmp_path / "mine")
+
+
+def test_the_authors_scenes_are_named_after_their_folder() -> None:
+    config = composed("scene=release", "scene.path=/some/where/bedroom")
+    assert config.scene.name == "release-bedroom"
+    assert config.renderer.scene.path == "/some/where/bedroom"
+    assert config.renderer.scene["_target_"] == "ngi.scene.release.read_release"

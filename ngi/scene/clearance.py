@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
-from ngi.backend import mi
-from ngi.scene.kinds import CameraPath, LookAt
+from ngi.backend import dr, mi
+from ngi.scene.kinds import CameraPath, LookAt, Material
 from ngi.scene.variable_scene import VariableScene
 
 Points = NDArray[np.float64]
+Hits = tuple[NDArray[np.bool_], NDArray[np.bool_], Points]
+Intersect = Callable[[Points, Points], Hits]
 
 CONFIGURATIONS = 24
 """Values of v at which the camera's places are tried; the first two are all 0 and all 1."""
@@ -30,39 +35,40 @@ def camera_problems(scene: VariableScene) -> list[str]:
     """
     generator = np.random.default_rng(0)
     size = float(np.linalg.norm(np.subtract(*scene.description.bounds)))
+    intersect = _intersections(scene.scene)
     problems: list[str] = []
     for index in range(CONFIGURATIONS):
         v = generator.random(scene.description.dimensions)
         v = np.full_like(v, index) if index < 2 else v
+        for variable, part in scene.description.parts():
+            if isinstance(variable, Material):  # in nobody's way, and slow to exchange
+                v[part] = 0
         scene.apply(v)
-        found = _blocked(scene, generator) or _too_near(scene.scene, size, generator)
+        place = np.array(mi.traverse(scene.scene.sensors()[0])["to_world"].matrix, dtype=float)
+        found = _blocked(scene, intersect, generator)
+        found = found or _too_near(place.reshape(4, 4)[:3, 3], intersect, size, generator)
         if found:
-            problems.append(
-                f"at v = {v.round(3).tolist() if len(v) < 16 else f'number {index}'}: {found}"
-            )
+            which = v.round(3).tolist() if len(v) < 16 else f"number {index}"
+            problems.append(f"at v = {which}: {found}")
     return problems
 
 
-def _blocked(scene: VariableScene, generator: np.random.Generator) -> str | None:
+def _blocked(
+    scene: VariableScene, intersect: Intersect, generator: np.random.Generator
+) -> str | None:
     for variable in scene.description.variables:
-        places = np.array(
-            [
-                variable.value(generator.random(len(variable.components)))[:3]
-                for _ in range(2 * SEGMENTS)
-                if isinstance(variable, LookAt | CameraPath)
-            ]
-        )
-        if not len(places):
-            continue
         if isinstance(variable, CameraPath):
             steps = np.linspace(0, 1, SEGMENTS + 1)[:, None]
             path = np.array([variable.value(step)[:3] for step in steps])
             start, end = path[:-1], path[1:]
-        else:
+        elif isinstance(variable, LookAt):
+            components = generator.random((2 * SEGMENTS, len(variable.components)))
+            places = np.array([variable.value(each)[:3] for each in components])
             start, end = places[:SEGMENTS], places[SEGMENTS:]
-        length = np.linalg.norm(end - start, axis=1)
-        start, end, length = start[length > 0], end[length > 0], length[length > 0]
-        hit, _, distance = _intersect(scene.scene, start, (end - start) / length[:, None])
+        else:
+            continue
+        length = np.maximum(np.linalg.norm(end - start, axis=1), 1e-12)
+        hit, _, distance = intersect(start, (end - start) / length[:, None])
         if (inside := hit & (distance < length)).any():
             first = int(np.argmax(inside))
             place = start[first] + (end - start)[first] * distance[first] / length[first]
@@ -71,12 +77,12 @@ def _blocked(scene: VariableScene, generator: np.random.Generator) -> str | None
     return None
 
 
-def _too_near(scene: mi.Scene, size: float, generator: np.random.Generator) -> str | None:
-    matrix = np.array(mi.traverse(scene.sensors()[0])["to_world"].matrix, dtype=np.float64)
-    place = matrix.reshape(4, 4)[:3, 3]
+def _too_near(
+    place: Points, intersect: Intersect, size: float, generator: np.random.Generator
+) -> str | None:
     directions = generator.normal(size=(DIRECTIONS, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    hit, behind, distance = _intersect(scene, np.broadcast_to(place, directions.shape), directions)
+    hit, behind, distance = intersect(np.tile(place, (DIRECTIONS, 1)), directions)
     nearest = distance[hit].min(initial=np.inf)
     if nearest < NEAREST * size:
         return f"the camera at {place.round(3).tolist()} is only {nearest:.3g} from a surface"
@@ -85,19 +91,30 @@ def _too_near(scene: mi.Scene, size: float, generator: np.random.Generator) -> s
     return None
 
 
-def _intersect(
-    scene: mi.Scene, origins: Points, directions: Points
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Points]:
-    """For n rays: whether they hit, whether from behind, and the distance."""
+def _intersections(scene: mi.Scene) -> Intersect:
+    """A function of n rays: whether they hit, whether from behind, and the distance."""
     if mi.variant().startswith("scalar"):
-        hits = [
-            scene.ray_intersect(mi.Ray3f(mi.Point3f(*o), mi.Vector3f(*d)))
-            for o, d in zip(origins.tolist(), directions.tolist(), strict=True)
-        ]
-        valid = np.array([bool(hit.is_valid()) for hit in hits])
-        cosine = np.array([np.dot(hit.n, d) for hit, d in zip(hits, directions, strict=True)])
-        return valid, cosine > 0, np.array([float(hit.t) for hit in hits])
-    rays = mi.Ray3f(mi.Point3f(*origins.T), mi.Vector3f(*directions.T))
-    hit = scene.ray_intersect(rays)
-    cosine = np.sum(np.array(hit.n) * directions.T, axis=0)
-    return np.array(hit.is_valid()), cosine > 0, np.array(hit.t, dtype=np.float64)
+        return partial(_intersect_one_by_one, scene)
+
+    @dr.freeze
+    def trace(scene: mi.Scene, rays: mi.Ray3f) -> tuple[mi.Bool, mi.Float, mi.Float]:
+        hit = scene.ray_intersect(rays)
+        return hit.is_valid(), dr.dot(hit.n, rays.d), hit.t
+
+    def intersect(origins: Points, directions: Points) -> Hits:
+        rays = mi.Ray3f(mi.Point3f(*origins.T), mi.Vector3f(*directions.T))
+        dr.make_opaque(rays)
+        valid, cosine, distance = trace(scene, rays)
+        return np.array(valid), np.array(cosine) > 0, np.array(distance, dtype=np.float64)
+
+    return intersect
+
+
+def _intersect_one_by_one(scene: mi.Scene, origins: Points, directions: Points) -> Hits:
+    hits = [
+        scene.ray_intersect(mi.Ray3f(mi.Point3f(*o), mi.Vector3f(*d)))
+        for o, d in zip(origins.tolist(), directions.tolist(), strict=True)
+    ]
+    valid = np.array([bool(hit.is_valid()) for hit in hits])
+    cosine = np.array([np.dot(hit.n, d) for hit, d in zip(hits, directions, strict=True)])
+    return valid, cosine > 0, np.array([float(hit.t) for hit in hits])

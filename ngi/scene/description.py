@@ -54,9 +54,10 @@ class SceneDescription:
         Raises ValueError, naming the component, for a v that is not [D] numbers in [0, 1].
         """
         v = self._checked(scene_vector)
-        return [variable.value(v[part]) for variable, part in self._parts()]
+        return [variable.value(v[part]) for variable, part in self.parts()]
 
-    def _parts(self) -> Iterator[tuple[Variable, slice]]:
+    def parts(self) -> Iterator[tuple[Variable, slice]]:
+        """Every variable and its components of v."""
         start = 0
         for variable in self.variables:
             count = len(variable.components)
