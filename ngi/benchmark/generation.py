@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable
 
 import torch
@@ -46,20 +47,22 @@ def leaving_out(scene: str, samples_per_pixel: int, repeats: int) -> list[Figure
 
     Everything: all buffers, rendered anew for every patch, and all geometry at the top level.
     """
-    description = read_scene(**scenes()[scene])
-    renderers = [
-        MitsubaRenderer(
-            scene=description,
+    seconds: list[list[float]] = []
+    sizes: list[float] = []
+    for needed_only in (False, True):
+        # One after the other: with two scenes in a process Dr.Jit cannot record the second's.
+        gc.collect()
+        renderer = MitsubaRenderer(
+            scene=read_scene(**scenes()[scene]),
             patch_size=PATCH_SIZE,
             samples_per_pixel=samples_per_pixel,
             needed_only=needed_only,
         )
-        for needed_only in (False, True)
-    ]
-    everything, needed = in_turn(
-        repeats, f"leaving out, {scene}", *(batches(renderer) for renderer in renderers)
-    )
-    size_of_all, size = (stored_bytes(renderer) for renderer in renderers)
+        seconds += in_turn(repeats, f"leaving out, {scene}", batches(renderer))
+        sizes.append(stored_bytes(renderer))
+        del renderer
+    everything, needed = seconds
+    size_of_all, size = sizes
     return [
         figure(f"{scene}: ms per patch, everything", [1e3 * t / PATCHES for t in everything], "ms"),
         figure(f"{scene}: ms per patch, needed", [1e3 * t / PATCHES for t in needed], "ms"),
