@@ -1,9 +1,11 @@
 """Arranges a scene's shapes so that moving one of them costs as little as Mitsuba lets it.
 
 When any shape changes, Mitsuba rebuilds the acceleration structure over all shapes at the top
-level, with Embree at its highest quality. What never moves is therefore put behind one instance:
-Mitsuba 3.9 rebuilds that one's structure too where Embree traces, but about five times faster. A
-mesh that moves as a whole becomes an instance, so that its vertices are never rewritten.
+level, with Embree at its highest quality. In a scene of large meshes, what never moves is therefore
+put behind one instance: Mitsuba 3.9 rebuilds that one's structure too where Embree traces, but
+about five times faster. In a scene of small ones the detour through the instance would cost more
+than it saves. A mesh that moves as a whole becomes an instance, so that its vertices are never
+rewritten.
 """
 
 from __future__ import annotations
@@ -16,11 +18,20 @@ from ngi.scene.kinds import KeyFrames, Rotation, Scale, Shape, Translation, Visi
 from ngi.scene.scene_files import SceneFile
 from ngi.scene.variable import Variable
 
+STATIC = "ngi_static"
+"""The id of the instance of what stays."""
+
 _PLACED = ("instance", "shapegroup", "sphere", "rectangle", "disk", "cylinder")
 """Shapes that have a to_world, and groups."""
 
 
-def arranged(document: SceneFile, variables: Sequence[Variable]) -> SceneFile:
+WORTHWHILE = 3_000_000
+"""Bytes of meshes that stay from which on they are put behind an instance."""
+
+
+def arranged(
+    document: SceneFile, variables: Sequence[Variable], *, worthwhile: int = WORTHWHILE
+) -> SceneFile:
     """The same scene, arranged for these variables; as it is where no shape moves.
 
     Emitters stay where they are: Mitsuba does not allow them in groups. Ids are kept; that of a
@@ -33,13 +44,12 @@ def arranged(document: SceneFile, variables: Sequence[Variable]) -> SceneFile:
         return document
     reshaped = {name for v in variables if isinstance(v, KeyFrames) for name in v.objects}
     emitters = {emitter.get("id") for emitter in root.findall("emitter")}
-    static = ElementTree.Element("shape", type="shapegroup", id="ngi_static_group")
+    static: list[ElementTree.Element] = []
     for shape in shapes:
         name, kind = shape.get("id"), shape.get("type")
         if _emits(shape, emitters) or kind in ("instance", "shapegroup") or name in reshaped:
             continue
         if name not in moved:
-            root.remove(shape)
             static.append(shape)
         elif kind not in _PLACED:
             root.remove(shape)
@@ -50,9 +60,12 @@ def arranged(document: SceneFile, variables: Sequence[Variable]) -> SceneFile:
             for transform in shape.findall("transform"):  # the instance's, so that it has an origin
                 shape.remove(transform)
                 instance.append(transform)
-    if len(static):
-        root.append(static)
-        _add_instance(root, "ngi_static", of=static)
+    if static and sum(_mesh_size(document, shape) for shape in static) >= worthwhile:
+        group = ElementTree.SubElement(root, "shape", type="shapegroup", id="ngi_static_group")
+        for shape in static:
+            root.remove(shape)
+            group.append(shape)
+        _add_instance(root, STATIC, of=group)
     return SceneFile(document.path, root, document.defaults)
 
 
@@ -65,6 +78,13 @@ def moving(variables: Sequence[Variable]) -> set[str]:
         elif isinstance(variable, Shape):
             moved.update(variable.choices)
     return moved
+
+
+def _mesh_size(document: SceneFile, shape: ElementTree.Element) -> int:
+    """Bytes of the shape's file, 0 where it has none."""
+    name = shape.find("string[@name='filename']")
+    path = document.path.parent / (document.value(name) if name is not None else "")
+    return path.stat().st_size if path.is_file() else 0
 
 
 def _emits(shape: ElementTree.Element, emitters: set[str | None]) -> bool:

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 from ngi.backend import activate
+from ngi.scene.arrangement import STATIC
 from ngi.scene.clearance import camera_problems
 from ngi.scene.description import SceneDescription
 from ngi.scene.folder import read_scene, scenes
@@ -76,7 +77,8 @@ def _geometry(scene: VariableScene) -> str:
     moving = sorted(scene.moving & shapes)
     if not moving:
         return "nothing moves: the acceleration structure is never rebuilt"
-    return f"moves: {', '.join(moving)}; everything else is behind one instance"
+    rest = "; everything else is behind one instance" if STATIC in shapes else ""
+    return f"moves: {', '.join(moving)}{rest}"
 
 
 def main(arguments: list[str] | None = None) -> int:

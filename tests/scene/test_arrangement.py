@@ -43,7 +43,7 @@ def move(*names):
 @pytest.mark.parametrize("variables", [[], [Material(("floor",), ("a", "b"))], [move("camera")]])
 def test_nothing_is_arranged_where_no_shape_moves(variables) -> None:
     scene = document()
-    assert arranged(scene, variables) is scene
+    assert arranged(scene, variables, worthwhile=0) is scene
 
 
 @pytest.mark.parametrize(
@@ -51,7 +51,7 @@ def test_nothing_is_arranged_where_no_shape_moves(variables) -> None:
 )
 def test_what_stays_is_one_instance_but_for_emitters(variable) -> None:
     scene = document()
-    result = arranged(scene, [variable])
+    result = arranged(scene, [variable], worthwhile=0)
     assert top_level(result) == {
         ("shapegroup", "chair_group"),
         ("instance", "chair"),
@@ -66,7 +66,7 @@ def test_what_stays_is_one_instance_but_for_emitters(variable) -> None:
 
 
 def test_a_mesh_that_moves_becomes_an_instance_with_its_place() -> None:
-    result = arranged(document(), [move("table")])
+    result = arranged(document(), [move("table")], worthwhile=0)
     instance = result.root.find("shape[@id='table']")
     assert instance.get("type") == "instance"
     assert instance.find("transform/translate").get("y") == "1"
@@ -77,7 +77,7 @@ def test_a_mesh_that_moves_becomes_an_instance_with_its_place() -> None:
 
 def test_spheres_emitters_and_key_framed_meshes_move_as_they_are() -> None:
     frames = KeyFrames(("curtain",), ("a.ply", "b.ply"))
-    result = arranged(document(), [move("bulb"), move("lamp"), move("floor"), frames])
+    result = arranged(document(), [move("bulb"), move("lamp"), move("floor"), frames], worthwhile=0)
     assert {
         ("sphere", "bulb"),
         ("rectangle", "lamp"),
@@ -90,7 +90,7 @@ def test_the_picture_is_the_same() -> None:
     activate("scalar")
     description = read_scene(BOX)
     plain = load(description.document)
-    moved = load(arranged(description.document, description.variables))
+    moved = load(arranged(description.document, description.variables, worthwhile=0))
     assert len(moved.shapes()) < len(plain.shapes())
     images = [np.array(mi.render(scene, spp=4, seed=1)) for scene in (plain, moved)]
     # A path may take another turn where rounding differs.
@@ -117,3 +117,18 @@ def test_a_moved_mesh_turns_about_its_authored_origin(tmp_path) -> None:
     corner = scene.scene.ray_intersect(mi.Ray3f([5 + 1.4, 5, 0], [0, -1, 0]))
     assert corner.is_valid(), "a cube turned by 45 degrees about its middle reaches to sqrt(2)"
     assert not scene.scene.ray_intersect(mi.Ray3f([5.95, 5, 0.95], [0, -1, 0])).is_valid()
+
+
+def test_small_scenes_keep_their_shapes_and_large_ones_do_not(tmp_path) -> None:
+    named = XML.replace(
+        '<shape type="ply" id="curtain"/>',
+        '<shape type="ply" id="curtain"><string name="filename" value="curtain.ply"/></shape>',
+    )
+    assert named != XML
+    (tmp_path / "curtain.ply").write_bytes(bytes(1000))
+    scene = SceneFile(tmp_path / "scene.xml", ElementTree.fromstring(named), {})
+    small = arranged(scene, [move("chair")], worthwhile=1001)
+    assert top_level(small) == top_level(scene)
+    large = arranged(scene, [move("chair")], worthwhile=1000)
+    assert ("instance", "ngi_static") in top_level(large)
+    assert ("ply", "curtain") not in top_level(large)
