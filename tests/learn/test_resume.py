@@ -128,7 +128,8 @@ def test_a_budget_in_seconds_is_run_time_and_is_not_overdrawn_on_resume(tmp_path
 
 
 def test_an_interrupted_run_says_how_to_go_on(tmp_path: Path) -> None:
-    output = stop_after(tmp_path, "last.ckpt", 0.05, signal.SIGINT)
+    endless = (*SMALL, "budget.steps=100000", "run.checkpoint_steps=7", "run.folder=run")
+    output = stop_after(tmp_path, "last.ckpt", 0.05, signal.SIGINT, endless)
     assert "the same command goes on from the last checkpoint, step" in output
     assert not (tmp_path / "run" / "result.json").exists()
 
