@@ -3,7 +3,7 @@
 When any shape changes, Mitsuba rebuilds the acceleration structure over all shapes at the top
 level, with Embree at its highest quality. In a scene of large meshes, what never moves is therefore
 put behind one instance: Mitsuba 3.9 rebuilds that one's structure too where Embree traces, but
-about five times faster. In a scene of small ones the detour through the instance would cost more
+two to three times faster. In a scene of small ones the detour through the instance would cost more
 than it saves. A mesh that moves as a whole becomes an instance, so that its vertices are never
 rewritten.
 """
