@@ -45,7 +45,8 @@ def generation(scene: str, samples_per_pixel: int, repeats: int) -> list[Figure]
 def leaving_out(scene: str, samples_per_pixel: int, repeats: int) -> list[Figure]:
     """Seconds and bytes per patch with everything, and with only what the scene needs.
 
-    Everything: all buffers, rendered anew for every patch, and all geometry at the top level.
+    Everything: all buffers, rendered anew for every patch, and all geometry at the top level. The
+    two are not timed in turn but one after the other.
     """
     seconds: list[list[float]] = []
     sizes: list[float] = []

@@ -10,7 +10,7 @@ from ngi.backend import dr, mi
 from ngi.patches import BufferLayout
 from ngi.render.emission import emission
 from ngi.render.materials import Material, collect_materials, evaluate_materials
-from ngi.render.needs import buffer_needs, complete_layout, needed_layout
+from ngi.render.needs import buffer_needs, needed_layout
 from ngi.render.specular import SpecularChain, specular_chain
 from ngi.scene.variable_scene import VariableScene
 
@@ -71,7 +71,7 @@ def first_hit_of(scene: VariableScene, *, needed_only: bool, trace_specular: boo
     """
     materials = collect_materials(scene.bsdfs())
     needs = buffer_needs(scene, materials)
-    layout = needed_layout(needs) if needed_only else complete_layout()
+    layout = needed_layout(needs) if needed_only else BufferLayout()
     chain = specular_chain(scene, materials) if trace_specular else None
     return FirstHit(
         layout=layout if chain is None else layout.adding(chain.buffers),

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ngi.backend import mi
-from ngi.patches import BUFFER_CHANNELS, BufferLayout
+from ngi.patches import BufferLayout
 from ngi.render.materials import Material
 from ngi.scene.variable_scene import VariableScene
 
@@ -38,10 +38,6 @@ def buffer_needs(scene: VariableScene, materials: list[Material]) -> list[Buffer
 
 def needed_layout(needs: list[BufferNeed]) -> BufferLayout:
     return BufferLayout(tuple(need.buffer for need in needs if need.needed))
-
-
-def complete_layout() -> BufferLayout:
-    return BufferLayout(tuple(BUFFER_CHANNELS))
 
 
 def buffers_are_static(scene: VariableScene, layout: BufferLayout) -> bool:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from typing import Any
 
 from ngi.backend import activate
 from ngi.scene.arrangement import STATIC
 from ngi.scene.clearance import camera_problems
 from ngi.scene.description import SceneDescription
 from ngi.scene.folder import read_scene, scenes
+from ngi.scene.loading import load
 from ngi.scene.scene_files import named_files, read_scene_file
 from ngi.scene.starter import candidates, starter_yaml
 from ngi.scene.variable_scene import VariableScene
@@ -28,16 +30,14 @@ def describe_scene(description: SceneDescription) -> tuple[str, list[str]]:
         "",
         "variables (component of v: value at 0 ... at 1):",
     ]
-    start = 0
-    for variable in description.variables:
+    for variable, part in description.parts():
         names = ["+".join(variable.objects) + "." + variable.kind, *variable.components]
-        stop = start + len(variable.components)
-        numbers = f"v[{start}]" if stop == start + 1 else f"v[{start}:{stop}]"
+        one = part.stop == part.start + 1
+        numbers = f"v[{part.start}]" if one else f"v[{part.start}:{part.stop}]"
         parts = ", ".join(filter(None, names[1:6])) + (", ..." if len(names) > 6 else "")
         lines.append(
             f"  {numbers:>9}  {names[0]}{f' ({parts})' if parts else ''}: {variable.range}"
         )
-        start = stop
     lines += ["", "buffers:"]
     needs = buffer_needs(scene, collect_materials(scene.bsdfs()))
     for need in needs:
@@ -49,10 +49,11 @@ def describe_scene(description: SceneDescription) -> tuple[str, list[str]]:
 
 
 def describe_file(path: Path) -> str:
-    """What could vary in a plain Mitsuba file."""
+    """What could vary in a plain Mitsuba file; writes a scene.yaml beside it, if there is none."""
     document = read_scene_file(path)
     named_files(document)
-    found, nameless = candidates(document)
+    scene = load(document)
+    found, nameless = candidates(scene)
     properties: dict[str, list[str]] = {}
     for candidate in found:
         properties.setdefault(candidate.object, []).append(candidate.property)
@@ -60,16 +61,13 @@ def describe_file(path: Path) -> str:
     lines += [f"  {name}: {', '.join(kinds)}" for name, kinds in properties.items()]
     if nameless:
         lines.append(f"  and {nameless} more object(s) without an id: give them one to vary them")
-    return "\n".join(lines)
-
-
-def write_starter(path: Path) -> Path:
-    """Writes scene.yaml beside a Mitsuba file; FileExistsError where there is one."""
     target = path.parent / "scene.yaml"
     if target.exists():
-        raise FileExistsError(f"{target} exists; describe its folder, or delete it to start anew")
-    target.write_text(starter_yaml(read_scene_file(path), path.resolve().parent.name))
-    return target
+        lines += ["", f"{target} is there: describe its folder {path.parent}"]
+    else:
+        target.write_text(starter_yaml(document, scene, found))
+        lines += ["", f"wrote {target}; adjust it, then describe its folder {path.parent}"]
+    return "\n".join(lines)
 
 
 def _geometry(scene: VariableScene) -> str:
@@ -82,11 +80,12 @@ def _geometry(scene: VariableScene) -> str:
 
 
 def main(arguments: list[str] | None = None) -> int:
+    known = scenes()
     parser = argparse.ArgumentParser(
         prog="python -m ngi.scene.describe",
         description="Describe a variable scene, check its camera, and say what a run leaves out; "
         "or list what could vary in a plain Mitsuba file and write a scene.yaml to start from.",
-        epilog=f"Scenes known by name: {', '.join(sorted(scenes()))}.",
+        epilog=f"Scenes known by name: {', '.join(sorted(known))}.",
     )
     parser.add_argument(
         "scene",
@@ -97,31 +96,25 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     try:
         activate(options.backend)
-        return _describe(options.scene)
+        return _describe(options.scene, known)
     except (ValueError, OSError, RuntimeError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
 
 
-def _describe(name: str) -> int:
+def _describe(name: str, known: dict[str, dict[str, Any]]) -> int:
     path = Path(name)
-    if name in scenes():
-        description = read_scene(**scenes()[name])
+    if name in known:
+        description = read_scene(**known[name])
     elif (path / "scene.yaml").is_file():
         description = read_scene(path)
     elif path.is_file() and path.suffix == ".xml" and "var_" not in path.read_text():
         print(describe_file(path))
-        if (path.parent / "scene.yaml").exists():
-            print(f"\n{path.parent / 'scene.yaml'} is there: describe its folder {path.parent}")
-        else:
-            print(
-                f"\nwrote {write_starter(path)}; adjust it, then describe its folder {path.parent}"
-            )
         return 0
     elif not path.exists():
         raise FileNotFoundError(
             f"{name}: no such file or folder, and no scene of this name; known are "
-            f"{', '.join(sorted(scenes()))}"
+            f"{', '.join(sorted(known))}"
         )
     else:
         from ngi.scene.release import read_release

@@ -5,6 +5,7 @@ Everything that can be wrong in either is found here, before Mitsuba is even imp
 
 from __future__ import annotations
 
+from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -102,16 +103,12 @@ def _first(scene: SceneDescription, dimensions: int, path: Path) -> SceneDescrip
     """The variant of a scene in which only the first components of v vary."""
     for count in range(len(scene.variables) + 1):
         if len(component_names(scene.variables[:count])) == dimensions > 0:
-            return SceneDescription(
+            return replace(
+                scene,
                 name=f"{scene.name}-{dimensions}",
-                document=scene.document,
-                samples_per_pixel=scene.samples_per_pixel,
-                max_depth=scene.max_depth,
-                bounds=scene.bounds,
                 variables=scene.variables[:count],
                 camera_path=tuple(v[:dimensions] for v in scene.camera_path),
                 hard_frames=tuple(v[:dimensions] for v in scene.hard_frames),
-                scene_hash=scene.scene_hash,
             )
     raise ValueError(
         f"{path}: variants: {dimensions} components are no whole number of the first variables"

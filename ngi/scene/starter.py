@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ngi.backend import mi
-from ngi.scene.loading import load
 from ngi.scene.scene_files import SceneFile, integrator_max_depth
 
 FACTOR = ", minimum: 0.5, maximum: 2"
@@ -24,11 +23,10 @@ class Candidate:
     entry: str
 
 
-def candidates(document: SceneFile) -> tuple[list[Candidate], int]:
+def candidates(scene: mi.Scene) -> tuple[list[Candidate], int]:
     """Everything that could vary, in the order of the file, and the number of objects that could
     but have no id.
     """
-    scene = load(document)
     hierarchy = mi.traverse(scene).hierarchy
     found: list[Candidate] = []
     nameless = 0
@@ -47,12 +45,13 @@ def candidates(document: SceneFile) -> tuple[list[Candidate], int]:
     return found, nameless
 
 
-def starter_yaml(document: SceneFile, folder_name: str) -> str:
+def starter_yaml(document: SceneFile, scene: mi.Scene, found: list[Candidate]) -> str:
     """The text of a scene.yaml: the camera or else the first candidate varies, the rest is there
     as comments.
+
+    document: the Mitsuba file, from which scene was loaded; found: its candidates.
     """
-    found, _ = candidates(document)
-    scene = load(document)
+    folder_name = document.path.resolve().parent.name
     low, high = _bounds(scene)
     active = next((c for c in found if c.property == "look_at"), found[0] if found else None)
     if active is None:
