@@ -5,6 +5,6 @@ here does not.
 """
 
 from ngi.render.analytic import AnalyticRenderer
-from ngi.render.protocol import RenderedPatches, Renderer
+from ngi.render.protocol import Deferred, PatchJob, RenderedPatches, Renderer
 
-__all__ = ["AnalyticRenderer", "RenderedPatches", "Renderer"]
+__all__ = ["AnalyticRenderer", "Deferred", "PatchJob", "RenderedPatches", "Renderer"]

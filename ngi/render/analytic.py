@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from ngi.patches import BufferLayout
-from ngi.render.protocol import RenderedPatches
+from ngi.render.protocol import Deferred, RenderedPatches
 from ngi.render.render_inputs import check_states, patch_window, require_positive
 from ngi.render.tracing import Window, derive_seed
 
@@ -87,6 +87,10 @@ class AnalyticRenderer:
             masked=0,
             paths=len(states) * P * P * self.samples_per_pixel,
         )
+
+    def start_patches(self, states: Tensor, *, resolution: int, seed: int) -> Deferred:
+        """See `ngi.render.Renderer.start_patches`."""
+        return Deferred(lambda: self.render_patches(states, resolution=resolution, seed=seed))
 
     def render_image(
         self, scene_vector: Tensor, *, resolution: int, samples_per_pixel: int, seed: int

@@ -11,7 +11,7 @@ from ngi.backend import activate, describe, mi
 from ngi.render.first_hit import first_hit_of
 from ngi.render.jit_tracer import JitTracer
 from ngi.render.needs import buffers_are_static
-from ngi.render.protocol import RenderedPatches
+from ngi.render.protocol import Deferred, RenderedPatches
 from ngi.render.render_inputs import check_states, patch_window, require_positive
 from ngi.render.scalar_tracer import ScalarTracer
 from ngi.render.tracing import Pending, Tracer, Window, derive_seed
@@ -132,6 +132,10 @@ class MitsubaRenderer:
             masked=masked,
             paths=renderings * P * P * self.samples_per_pixel,
         )
+
+    def start_patches(self, states: Tensor, *, resolution: int, seed: int) -> Deferred:
+        """See `ngi.render.Renderer.start_patches`."""
+        return Deferred(lambda: self.render_patches(states, resolution=resolution, seed=seed))
 
     def render_image(
         self, scene_vector: Tensor, *, resolution: int, samples_per_pixel: int, seed: int

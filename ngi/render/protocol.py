@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -24,6 +25,37 @@ class RenderedPatches:
     repaired: int
     masked: int
     paths: int
+
+
+class PatchJob(Protocol):
+    """Patches that are being rendered, or will be when they are asked for."""
+
+    def done(self) -> bool:
+        """Whether `result` has nobody else to wait for."""
+        ...
+
+    def result(self) -> RenderedPatches:
+        """The patches, waited for; the same object every time.
+
+        Raises what `Renderer.render_patches` raises.
+        """
+        ...
+
+
+class Deferred:
+    """The `PatchJob` of a renderer that works in this process: it renders when it is asked."""
+
+    def __init__(self, render: Callable[[], RenderedPatches]) -> None:
+        self._render = render
+        self._result: RenderedPatches | None = None
+
+    def done(self) -> bool:
+        return True
+
+    def result(self) -> RenderedPatches:
+        if self._result is None:
+            self._result = self._render()
+        return self._result
 
 
 class Renderer(Protocol):
@@ -54,6 +86,10 @@ class Renderer(Protocol):
         Raises ValueError for states of the wrong length or outside [0, 1], or a patch larger than
         the image.
         """
+        ...
+
+    def start_patches(self, states: Tensor, *, resolution: int, seed: int) -> PatchJob:
+        """`render_patches` that may go on beside whatever the caller does next."""
         ...
 
     def render_image(
