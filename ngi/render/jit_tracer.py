@@ -13,8 +13,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
+import torch
+from torch import Tensor
 
 from ngi.backend import dr, mi
 from ngi.render.first_hit import FirstHit
@@ -68,36 +68,45 @@ class JitTracer:
 
         self._radiance = _replayed(trace_radiance) if frozen else trace_radiance
         self._buffers = _replayed(trace_buffers) if frozen else trace_buffers
-        self._clean = not frozen
+        self._trace_radiance = trace_radiance
+        self._ready = not frozen
 
     def radiance(self, window: Window, *, samples: int, seed: int) -> Pending:
-        self._collect_earlier_scenes()
+        self._prepare(window)
         view = _View.of(window, samples)
         paths = window.width * window.height * samples
         sums = self._radiance(self._scene, view, dr.opaque(mi.UInt32, seed), samples, paths)
         return _pending(sums, window, samples)
 
     def buffers(self, window: Window) -> Pending:
-        self._collect_earlier_scenes()
+        self._prepare(window)
         samples = self._buffer_samples
         view = _View.of(window, samples)
         rays = window.width * window.height * samples
         sums = self._buffers(self._scene, view, self._points, samples, rays)
         return _pending(sums, window, samples)
 
-    def _collect_earlier_scenes(self) -> None:
-        """Before the first recording: what is left of an earlier scene in reference cycles is
-        still in Dr.Jit's registry, and recording a frozen function trips over it.
+    def _prepare(self, window: Window) -> None:
+        """Before the first recording.
+
+        What is left of an earlier scene in reference cycles is still in Dr.Jit's registry, and
+        recording a frozen function trips over it. It also trips over what is made at the first
+        use only, such as the tables that textured emitters are sampled by; so radiance is traced
+        once, with one sample per pixel, the result of which is thrown away.
         """
-        if not self._clean:
-            gc.collect()
-            self._clean = True
+        if self._ready:
+            return
+        gc.collect()
+        pixels = window.width * window.height
+        view, seed = _View.of(window, 1), dr.opaque(mi.UInt32, 0)
+        dr.eval(self._trace_radiance(self._scene, view, seed, 1, pixels))
+        self._ready = True
 
 
 def _replayed(function: Trace) -> Trace:
     """The function with its kernel launches recorded and replayed, where Dr.Jit can do that.
 
-    Dr.Jit 1.5 cannot for some scenes, those with textured area emitters among them: then Python
+    Dr.Jit 1.5 cannot always, for example where another scene was loaded meanwhile: then Python
     traces the function again for every patch, which costs time but compiles nothing either.
     """
     # A variable material makes a recording for every combination of the choices.
@@ -157,9 +166,12 @@ def _block_sums(values: list[mi.Float], samples: int) -> list[mi.Float]:
 
 
 def _pending(sums: list[mi.Float], window: Window, samples: int) -> Pending:
-    def read() -> NDArray[np.float32]:
-        mean = np.stack([np.asarray(channel) for channel in sums], axis=-1)
+    def read() -> Tensor:
+        dr.sync_thread()
+        mean = torch.stack([torch.from_dlpack(channel) for channel in sums], dim=-1)
         mean /= samples
-        return mean.reshape(window.height, window.width, len(sums))
+        if mean.is_cuda:
+            torch.cuda.synchronize()  # before Dr.Jit uses the memory of the sums again
+        return mean.view(window.height, window.width, len(sums))
 
     return read

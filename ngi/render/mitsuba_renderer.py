@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
 from ngi.backend import activate, describe, mi
@@ -19,7 +18,7 @@ from ngi.scene import SceneDescription
 from ngi.scene.variable_scene import VariableScene
 
 PATHS_PER_LAUNCH = 2**22
-"""Images are traced in launches of at most this many paths: about 200 MB."""
+"""Images and patches are traced in launches of about this many paths at most: about 200 MB."""
 
 SAMPLES_PER_PASS = 256
 """Samples of an image's pixel that are summed in single precision before double takes over."""
@@ -90,7 +89,7 @@ class MitsubaRenderer:
             )
         self.layout = first_hit.layout
         self._static = needed_only and buffers_are_static(self._scene, self.layout)
-        self._static_buffers: dict[int, NDArray[np.float32]] = {}
+        self._static_buffers: dict[int, Tensor] = {}
         self.dimensions = scene.dimensions
         self.patch_size = patch_size
         self.samples_per_pixel = samples_per_pixel or scene.samples_per_pixel
@@ -151,21 +150,21 @@ class MitsubaRenderer:
         state = np.asarray(scene_vector, dtype=np.float32).tobytes()
         bands = []
         for band in _bands(resolution, min(samples_per_pixel, SAMPLES_PER_PASS)):
-            total = np.zeros((band.height, resolution, 3))
+            total = torch.zeros(band.height, resolution, 3, dtype=torch.float64)
             for start in range(0, samples_per_pixel, SAMPLES_PER_PASS):
                 samples = min(SAMPLES_PER_PASS, samples_per_pixel - start)
                 number = derive_seed(seed, state, resolution, band.y, start)
                 radiance = self._image_tracer.radiance(band, samples=samples, seed=number)()
-                total += samples * radiance.astype(np.float64)
+                total += samples * radiance.cpu().double()
             bands.append(total / samples_per_pixel)
-        return torch.from_numpy(np.concatenate(bands).astype(np.float32))
+        return torch.cat(bands).float()
 
     def image_buffers(self, scene_vector: Tensor, *, resolution: int) -> Tensor:
         """See `ngi.render.Renderer.image_buffers`; the same as a patch's at the same pixels."""
         require_positive(resolution=resolution)
         mi.set_variant(self._variant)
         self._scene.apply(scene_vector)
-        return self._encode(torch.from_numpy(self._whole_buffers(resolution)))
+        return self._encode(self._whole_buffers(resolution)).cpu()
 
     def hard_frames(self) -> Tensor:
         """[10, D]: the scene's hard test frames (paper, Sec. 7.2.1)."""
@@ -176,8 +175,15 @@ class MitsubaRenderer:
     ) -> tuple[Pending, Pending]:
         window = patch_window(state[-2:], patch_size=self.patch_size, resolution=resolution)
         self._scene.apply(state[:-2])
-        number = derive_seed(seed, state.numpy().tobytes(), resolution, attempt)
-        radiance = self._patch_tracer.radiance(window, samples=self.samples_per_pixel, seed=number)
+        parts = (seed, state.numpy().tobytes(), resolution, attempt)
+        passes = [
+            (samples, self._patch_tracer.radiance(window, samples=samples, seed=number))
+            for samples, number in _passes(self.samples_per_pixel, self.patch_size**2, parts)
+        ]
+
+        def radiance() -> Tensor:
+            return sum((n * mean() for n, mean in passes), torch.zeros(())) / self.samples_per_pixel
+
         if not self._static:
             return radiance, self._patch_tracer.buffers(window)
         if resolution not in self._static_buffers:  # of the growing resolutions, the last one
@@ -187,10 +193,10 @@ class MitsubaRenderer:
         buffers = self._static_buffers[resolution][rows, columns]
         return radiance, lambda: buffers
 
-    def _whole_buffers(self, resolution: int) -> NDArray[np.float32]:
+    def _whole_buffers(self, resolution: int) -> Tensor:
         """[H, W, C] of the scene as it stands, emission linear; no NaN or Inf."""
         bands = _bands(resolution, self._buffer_samples)
-        return np.concatenate([_masked(self._image_tracer.buffers(band)()) for band in bands])
+        return torch.cat([_masked(self._image_tracer.buffers(band)()) for band in bands])
 
     def _encode(self, buffers: Tensor) -> Tensor:
         """Emission becomes log1p of its mean, in place."""
@@ -216,14 +222,21 @@ def _bands(resolution: int, samples: int) -> list[Window]:
     ]
 
 
-def _finite(*arrays: NDArray[np.float32]) -> bool:
-    return all(bool(np.isfinite(array).all()) for array in arrays)
+def _passes(samples: int, pixels: int, seed: tuple[int | bytes, ...]) -> list[tuple[int, int]]:
+    """Samples per pixel and seed of each launch: as few as `PATHS_PER_LAUNCH` allows, alike."""
+    count = -(-samples * pixels // PATHS_PER_LAUNCH)
+    sizes = [samples // count + (i < samples % count) for i in range(count)]
+    return [(size, derive_seed(*seed, i)) for i, size in enumerate(sizes)]
 
 
-def _masked(array: NDArray[np.float32]) -> NDArray[np.float32]:
+def _finite(*tensors: Tensor) -> bool:
+    return all(bool(tensor.isfinite().all()) for tensor in tensors)
+
+
+def _masked(tensor: Tensor) -> Tensor:
     """Every pixel that holds a NaN or Inf set to zero, in all of its channels."""
-    return np.where(np.isfinite(array).all(axis=-1, keepdims=True), array, np.float32(0))
+    return tensor.where(tensor.isfinite().all(dim=-1, keepdim=True), 0)
 
 
-def _stack(arrays: list[NDArray[np.float32]], shape: tuple[int, ...]) -> Tensor:
-    return torch.from_numpy(np.stack(arrays)) if arrays else torch.empty(0, *shape)
+def _stack(tensors: list[Tensor], shape: tuple[int, ...]) -> Tensor:
+    return torch.stack(tensors) if tensors else torch.empty(0, *shape)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
 from ngi.backend import mi
@@ -37,7 +38,7 @@ class ScalarTracer:
             self._copy[key] = camera[key]
         self._copy.update()
         image = mi.render(self._scene, sensor=self._sensor, seed=seed, spp=samples)
-        result = np.array(image, dtype=np.float32)
+        result = torch.from_numpy(np.array(image, dtype=np.float32))
         return lambda: result
 
     def buffers(self, window: Window) -> Pending:
@@ -46,7 +47,8 @@ class ScalarTracer:
             for row in range(window.height)
             for column in range(window.width)
         ]
-        result = np.array(means, dtype=np.float32).reshape(window.height, window.width, -1)
+        numbers = np.array(means, dtype=np.float32).reshape(window.height, window.width, -1)
+        result = torch.from_numpy(numbers)
         return lambda: result
 
     def _pixel(self, x: int, y: int, resolution: int) -> NDArray[np.float64]:

@@ -9,9 +9,11 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from torch import Tensor
 
-Pending = Callable[[], NDArray[np.float32]]
-"""Waits for a computation that may still be running and returns its [height, width, channels]."""
+Pending = Callable[[], Tensor]
+"""Waits for a computation that may still be running and returns its [height, width, channels],
+float32, on the device that computed it."""
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ngi.backend import dr, mi
 from ngi.scene.assets import Bitmap, authored_to_world, load_vertices
 from ngi.scene.bodies import Emission, Transformed, Vertices
+from ngi.scene.changes import Changes
 from ngi.scene.placement import Placement, parking
 from ngi.scene.scene_files import SceneFile
 from ngi.scene.variable import Values, Write
@@ -33,6 +34,7 @@ class SceneParameters:
 
     def __init__(self, scene: mi.Scene, *, document: SceneFile, size: float) -> None:
         self._parameters = mi.traverse(scene)
+        self._changes = Changes(scene, self._parameters)
         self._document = document
         self._file = document.path
         self._size = size
@@ -119,6 +121,7 @@ class SceneParameters:
         """
         kind = type(self._parameters[key])
         if value.shape == (4, 4):
+            self._changes.place(self.owner(key), value)
             new = kind(value) if mi.variant().startswith("scalar") else kind(mi.Matrix4f(value))
         elif value.ndim == 3 or value.size > 4:
             numbers = np.uint8 if kind.__name__ == "TensorXu8" else np.float32
@@ -245,7 +248,7 @@ class SceneParameters:
         }
 
     def update(self) -> None:
-        """Tells the objects whose parameters were written, and their parents."""
+        """Has the scene take note of what was written."""
         for placement in self._placements.values():
             placement.flush()
-        self._parameters.update()
+        self._changes.tell()

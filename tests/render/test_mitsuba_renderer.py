@@ -163,7 +163,7 @@ def test_pixels_of_an_image_that_are_not_finite_stay_so(load_box, monkeypatch) -
 
     def broken(window, **arguments):
         calls.append(arguments["seed"])
-        image = radiance(window, **arguments)().copy()
+        image = radiance(window, **arguments)().clone()
         image[3, 4, 1] = np.nan
         image[5, 6] = np.inf
         return lambda: image
@@ -193,6 +193,27 @@ def test_scalar_images_follow_the_camera(box_folder) -> None:
     torch.testing.assert_close((moved > 5).all(-1), (emission > 1).all(-1))
 
 
+def test_many_samples_are_traced_in_passes_that_weigh_by_their_samples(
+    load_box, monkeypatch
+) -> None:
+    monkeypatch.setattr("ngi.render.mitsuba_renderer.PATHS_PER_LAUNCH", 3 * 16 * 16)
+    renderer = load_box("llvm", buffer_samples=1, patch_size=16)
+    assert renderer.samples_per_pixel == 8
+    passes = {}
+
+    def numbered(window, *, samples, seed):
+        passes[seed] = samples
+        image = torch.full((window.height, window.width, 3), float(len(passes)))
+        return lambda: image
+
+    monkeypatch.setattr(renderer._patch_tracer, "radiance", numbered)
+    patches = renderer.render_patches(states(1), resolution=40, seed=0)
+    assert list(passes.values()) == [3, 3, 2]
+    mean = (3 * 1 + 3 * 2 + 2 * 3) / 8
+    torch.testing.assert_close(patches.log_radiance.expm1(), torch.full((1, 16, 16, 3), mean))
+    assert patches.paths == 16 * 16 * 8
+
+
 @pytest.mark.parametrize(("bad_attempts", "masked"), [(1, 0), (2, 1)])
 def test_pixels_that_are_not_finite(load_box, monkeypatch, bad_attempts, masked) -> None:
     renderer = load_box("llvm", buffer_samples=1, patch_size=16)
@@ -201,7 +222,7 @@ def test_pixels_that_are_not_finite(load_box, monkeypatch, bad_attempts, masked)
 
     def broken(window, **arguments):
         calls.append(arguments["seed"])
-        image = radiance(window, **arguments)().copy()
+        image = radiance(window, **arguments)().clone()
         if len(calls) <= bad_attempts:
             image[3, 4, 1] = np.nan
         return lambda: image

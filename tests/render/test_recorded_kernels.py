@@ -1,5 +1,6 @@
-"""Scenes whose kernels Dr.Jit cannot record are rendered all the same."""
+"""Kernels that Dr.Jit records, and scenes of which it cannot."""
 
+import gc
 import logging
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 import torch
 from PIL import Image
 
-from ngi.backend import llvm_problem
+from ngi.backend import dr, llvm_problem
 from ngi.render.measure import counted_compilations
 from ngi.render.mitsuba_renderer import MitsubaRenderer
 from ngi.scene import read_scene
@@ -28,8 +29,11 @@ SCENE = """<scene version="3.0.0">
 </scene>"""
 
 
-@pytest.mark.skipif(llvm_problem() is not None, reason=str(llvm_problem()))
-def test_a_textured_emitter(tmp_path, caplog) -> None:
+pytestmark = pytest.mark.skipif(llvm_problem() is not None, reason=str(llvm_problem()))
+
+
+@pytest.fixture
+def renderer_of_a_screen(tmp_path):
     pixels = np.random.default_rng(0).integers(0, 255, (8, 8, 3), dtype=np.uint8)
     Image.fromarray(pixels).save(tmp_path / "screen.png")
     (tmp_path / "scene.xml").write_text(SCENE)
@@ -38,18 +42,42 @@ def test_a_textured_emitter(tmp_path, caplog) -> None:
         "bounds: {minimum: [-3, 0, -3], maximum: [3, 3, 3]}, variables: [{object: ball,\n"
         "property: translation, minimum: [0, 0, 0], maximum: [1, 0, 0]}]}"
     )
-    renderer = MitsubaRenderer(scene=read_scene(tmp_path), backend="llvm", patch_size=8)
+    gc.collect()
+    return lambda: MitsubaRenderer(scene=read_scene(tmp_path), backend="llvm", patch_size=8)
+
+
+V = torch.tensor([0.3])
+STATES = torch.cat([V, torch.zeros(2)]).expand(4, 3)
+
+
+def test_a_textured_emitter_is_recorded(renderer_of_a_screen, caplog) -> None:
+    renderer = renderer_of_a_screen()
     with caplog.at_level(logging.WARNING):
         renderer.warm_up()
-    assert "patches of this scene take longer" in caplog.text
-    caplog.clear()
-    v = torch.tensor([0.3])
-    states = torch.cat([v, torch.zeros(2)]).expand(4, 3)
+    assert not caplog.text
     with counted_compilations() as compiled:
-        patches = [renderer.render_patches(states, resolution=8, seed=seed) for seed in range(4)]
+        patches = [renderer.render_patches(STATES, resolution=8, seed=seed) for seed in range(4)]
     assert compiled == [0]
-    assert not caplog.text, "it is said once"
     mean = torch.stack([p.log_radiance.expm1() for p in patches]).mean(dim=(0, 1))
-    image = renderer.render_image(v, resolution=8, samples_per_pixel=1024, seed=9)
+    image = renderer.render_image(V, resolution=8, samples_per_pixel=1024, seed=9)
     assert image.max() > 0.2, "the screen is in view"
     torch.testing.assert_close(mean, image, atol=0.02, rtol=0.1)
+
+
+def test_what_cannot_be_recorded_is_traced_each_time(
+    renderer_of_a_screen, caplog, monkeypatch
+) -> None:
+    expected = renderer_of_a_screen().render_patches(STATES, resolution=8, seed=1)
+
+    def fails(*_):
+        raise RuntimeError("record(): not this one")
+
+    monkeypatch.setattr(dr, "freeze", lambda _function, **_options: fails)
+    renderer = renderer_of_a_screen()
+    with caplog.at_level(logging.WARNING):
+        patches = renderer.render_patches(STATES, resolution=8, seed=1)
+        renderer.render_patches(STATES, resolution=8, seed=2)
+    said = "patches of this scene take longer: record(): not this one"
+    assert caplog.messages == [said, said], "once for the radiance, once for the buffers"
+    assert torch.equal(patches.log_radiance, expected.log_radiance)
+    assert torch.equal(patches.buffers, expected.buffers)

@@ -1,0 +1,48 @@
+"""Tells the objects of a loaded scene that their parameters were written."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ngi.backend import dr, mi
+from ngi.scene.acceleration import EmbreeScene
+
+GEOMETRY = frozenset({"to_world", "vertex_positions", "vertex_normals"})
+"""Parameters of a shape that say where it is."""
+
+
+class Changes:
+    """As `mi.SceneParameters.update`, but shapes that moved are moved in the acceleration
+    structure, where that is possible, instead of having all of it built again.
+    """
+
+    def __init__(self, scene: mi.Scene, parameters: mi.SceneParameters) -> None:
+        self._scene = scene
+        self._parameters = parameters
+        self._structure = EmbreeScene.of(scene)
+        self._to_world: dict[mi.Object, NDArray[np.float64]] = {}
+
+    def place(self, node: mi.Object, to_world: NDArray[np.float64]) -> None:
+        """Takes note of the to_world [4, 4] that was written to an object."""
+        self._to_world[node] = to_world
+
+    def tell(self) -> None:
+        """Tells the objects that were written, and what they are part of, deepest first."""
+        written = self._parameters.nodes_to_update
+        moved = [
+            node
+            for (_, node), names in written.items()
+            if isinstance(node, mi.Shape) and not GEOMETRY.isdisjoint(names)
+        ]
+        if self._structure is None or any(shape not in self._structure for shape in moved):
+            self._parameters.update()
+            return
+        for (_, node), names in sorted(written.items(), key=lambda entry: -entry[0][0]):
+            if node != self._scene:
+                node.parameters_changed(list(names))
+        written.clear()
+        self._parameters.update_candidates.clear()
+        dr.eval()
+        if moved:
+            self._structure.move({shape: self._to_world.get(shape) for shape in moved})
