@@ -33,10 +33,12 @@ NOT_IDENTITY = (
     "tracker",
     "label",
     "renderer.scene",
+    "renderer.workers",
+    "renderer.cluster",
     "evaluation.evaluator.cache",
     "evaluation.evaluator.lpips",
 )
-"""Parts of the configuration that do not decide what a run computes: names and places."""
+"""Parts of the configuration that do not decide what a run computes: names, places, helpers."""
 
 
 def train(config: DictConfig) -> dict[str, Any]:
@@ -80,6 +82,7 @@ def _train(
         schedule=instantiate(config.resolution),
         clock=clock,
         seed=config.seed,
+        when_late=config.reuse.when_late,
     )
     module = learn.IlluminationModule(
         network=learn.seeded(instantiate(config.model), seed=config.seed)(

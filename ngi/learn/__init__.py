@@ -1,5 +1,6 @@
 """Where exploration, rendering, reuse and the network meet."""
 
+from ngi.learn.batch import Batch, Feedback
 from ngi.learn.budget import Budget, Seconds, Steps
 from ngi.learn.callbacks import callbacks
 from ngi.learn.checkpoint import AtomicCheckpointIO, prepare_resume
@@ -10,7 +11,7 @@ from ngi.learn.recorder import Recorder
 from ngi.learn.row_log import RowLog
 from ngi.learn.run_folder import RunFolder
 from ngi.learn.scorer import Scorer
-from ngi.learn.stream import Batch, Feedback, TrainingStream
+from ngi.learn.stream import TrainingStream
 from ngi.learn.tracker import Local, Tracker, WeightsAndBiases
 from ngi.reuse import PatchArchive
 

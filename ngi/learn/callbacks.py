@@ -99,6 +99,7 @@ class PeriodicEvaluation(Callback):
         used = budget_used(self._budget, self._stream, self._clock)
         due = int(used * self._count)
         if used < 1 and due > self._done:
+            self._stream.finish_rendering()
             self._recorder.evaluate()
             self._done = due
 
@@ -157,6 +158,8 @@ class BudgetAndCheckpoint(Callback):
         self._show(min(used, 1.0), float(outputs["loss"]))
         periodic = self._every_steps is not None and steps % self._every_steps == 0
         if used >= 1 or periodic or seconds - self._saved_at >= self._every_seconds:
+            if used < 1:  # nobody waits for patches that no step follows
+                self._stream.finish_rendering()
             with self._clock.phase("checkpoint"):
                 self._save(trainer)
             self._saved_at, self._saved_step = self._clock.run_seconds, steps

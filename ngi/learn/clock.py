@@ -1,7 +1,8 @@
 """Seconds by phase, and the run time that budgets and plots mean.
 
 "Error against run time" compares methods at equal time, so evaluating and writing checkpoints,
-which are ours and not the method's, stop the clock.
+which are ours and not the method's, stop the clock. Nothing of the method may go on meanwhile, so
+that patches which other processes render are waited for first (`TrainingStream.finish_rendering`).
 """
 
 from __future__ import annotations
@@ -11,7 +12,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 PHASES = ("explore", "render", "reuse", "score", "train", "other")
-"""Phases that are run time; 'other' is whatever lies between the named ones."""
+"""Phases that are run time; 'other' is whatever lies between the named ones.
+
+'render' is the time in which training stands still for the renderer: it renders in this process,
+or waits for patches that others render.
+"""
 
 PAUSES = ("evaluate", "checkpoint")
 """Phases during which run time stands still."""

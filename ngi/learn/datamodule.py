@@ -6,8 +6,9 @@ from typing import Any
 
 from torch.utils.data import DataLoader
 
+from ngi.learn.batch import Batch
 from ngi.learn.lightning_api import LightningDataModule
-from ngi.learn.stream import Batch, TrainingStream
+from ngi.learn.stream import TrainingStream
 
 
 class ExplorationDataModule(LightningDataModule):

@@ -9,10 +9,10 @@ import torch
 from torch import Tensor, nn
 
 from ngi.explore import Target
+from ngi.learn.batch import Batch, Feedback
 from ngi.learn.clock import PhaseClock
 from ngi.learn.lightning_api import LightningModule
 from ngi.learn.scorer import Scorer
-from ngi.learn.stream import Batch, Feedback
 from ngi.models import SampleLoss
 from ngi.patches import Patches
 

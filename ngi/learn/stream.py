@@ -1,86 +1,47 @@
 """The on-the-fly training data: explore, render, store or reuse, one batch per training step.
 
-This is where exploration, rendering and reuse take turns (paper, Sec. 5 and 6.1). The training
-step answers every batch with `feedback`; without it the next batch is refused, because chains and
-policy would run one step behind the network.
+This is where exploration, rendering and reuse meet (paper, Sec. 5 and 6.1). The next proposals are
+handed to the renderer before it is decided whether the next batch is a new one; a renderer of
+several processes works on them while stored patches are trained on. The training step answers every
+batch with `feedback`; without it the next batch is refused, because chains and policy would run one
+step behind the network.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
 from typing import Any
 
 import torch
-from torch import Tensor
 from torch.utils.data import IterableDataset
 
-from ngi.explore import ChainInfo, ChainState, MarkovChains, Proposals, ResolutionSchedule
+from ngi.explore import ChainInfo, ChainState, MarkovChains, ResolutionSchedule
+from ngi.learn.ahead import ProposalsAhead
+from ngi.learn.batch import Batch, Counters, Feedback
 from ngi.learn.clock import PhaseClock
-from ngi.patches import Patches
 from ngi.render.protocol import Renderer
 from ngi.reuse import PatchArchive, PatchStore, ReusePolicy
-
-
-@dataclass(frozen=True)
-class Batch:
-    """One training batch.
-
-    patches: [n] what is trained on: the proposals just rendered, or stored patches
-    ids: [n] int64, their identities in the store
-    generated: whether they were rendered for this batch
-    current: [n] the chains' current states, to be scored beside the proposals; None where the
-        acceptance rule does not look at them, on the first batch, and on reuse
-    """
-
-    patches: Patches
-    ids: Tensor
-    generated: bool
-    current: Patches | None
-
-    def to(self, device: torch.device | str) -> Batch:
-        current = None if self.current is None else self.current.to(device)
-        return Batch(self.patches.to(device), self.ids.to(device), self.generated, current)
-
-
-@dataclass(frozen=True)
-class Feedback:
-    """What the training step learnt from a batch, all under the weights before that step.
-
-    losses: [n] loss per sample
-    target_proposed: [n] target density of the proposals, which the step's backward pass brings;
-        None where nothing had to be scored
-    target_current: [n] that of the chains' current states
-    """
-
-    losses: Tensor
-    target_proposed: Callable[[], Tensor] | None
-    target_current: Tensor | None
-
-
-@dataclass
-class Counters:
-    """Running totals of a run; all are logged and checkpointed."""
-
-    iteration: int = 0
-    generated_batches: int = 0
-    patches_traced: int = 0
-    paths_traced: int = 0
-    patches_repaired: int = 0
-    patches_masked: int = 0
-
 
 ENDLESS = 2**31
 """The length of a stream. Lightning prefetches one batch of a dataset without a length, and the
 sampler would run one step behind the network."""
 
+WHEN_LATE = ("wait", "reuse")
+
 
 class TrainingStream(IterableDataset[Batch]):
     """Endless batches of `sampler.chains` patches.
 
-    seed: the same seed gives the same batches on the same machine, also across a resume.
+    The chains propose at the first batch and at each that follows a generated one; patches have the
+    resolution of the iteration at which they were proposed.
+
+    seed: the same seed gives the same batches on the same machine, also across a resume, and
+        wherever the patches are rendered.
+    when_late: what to do where a new batch is due that is not rendered yet: 'wait' for it, or
+        'reuse' stored patches until it is, which makes the batches depend on the machine's speed.
+        Where the policy would never reuse, as in the bootstrap, it is waited for all the same.
     Raises ValueError where the schedule's first image is smaller than a patch, or the store than
-    two batches.
+    two batches, and for an unknown `when_late`.
     """
 
     def __init__(
@@ -94,6 +55,7 @@ class TrainingStream(IterableDataset[Batch]):
         schedule: ResolutionSchedule,
         clock: PhaseClock,
         seed: int,
+        when_late: str,
     ) -> None:
         super().__init__()
         if schedule.resolution(0) < renderer.patch_size:
@@ -106,6 +68,11 @@ class TrainingStream(IterableDataset[Batch]):
                 f"reuse.store.capacity: {store.capacity} patches do not hold the chains' current "
                 f"states and a new batch; expected at least {2 * sampler.chains}"
             )
+        if when_late not in WHEN_LATE:
+            raise ValueError(
+                f"reuse.when_late: '{when_late}'; expected one of {list(WHEN_LATE)}: wait for "
+                "patches that are not rendered yet, or train on stored ones until they are"
+            )
         self.sampler = sampler
         self.store = store
         self.counters = Counters()
@@ -116,12 +83,14 @@ class TrainingStream(IterableDataset[Batch]):
         self._policy = policy
         self._schedule = schedule
         self._clock = clock
+        self._when_late = when_late
         self._generator = torch.Generator().manual_seed(seed)
         self._chains: ChainState = sampler.init(renderer.dimensions + 2)
         self._policy_state = policy.init()
-        self._batch_resolution = self.resolution
+        self._resolution = schedule.resolution(0)  # of the latest proposals
+        self._ahead: ProposalsAhead | None = None
         self._saved_store: dict[str, Any] | None = None
-        self._pending: tuple[Batch, Proposals | None] | None = None
+        self._pending: Batch | None = None
 
     def __len__(self) -> int:
         return ENDLESS
@@ -130,27 +99,19 @@ class TrainingStream(IterableDataset[Batch]):
         while True:
             if self._pending is not None:
                 raise RuntimeError("the last batch got no feedback; call feedback() after each one")
-            batch, proposals = self._next()
-            self._pending = (batch, proposals)
-            yield batch
-
-    @property
-    def resolution(self) -> int:
-        """Pixels along a side of the virtual image at the present iteration."""
-        return self._schedule.resolution(self.counters.iteration)
+            self._pending = self._next()
+            yield self._pending
 
     def feedback(self, feedback: Feedback) -> None:
         """Lets chains, store and policy learn from the batch last given out."""
         if self._pending is None:
             raise RuntimeError("feedback without a batch")
-        batch, proposals = self._pending
-        self._pending = None
+        batch, self._pending = self._pending, None
         losses = feedback.losses.detach().float().cpu()
-        self._batch_resolution = self.resolution
         with self._clock.phase("explore"):
             self._chain_info = None
-            if proposals is not None:
-                self._accept(batch, proposals, feedback)
+            if batch.generated:
+                self._accept(batch, feedback)
         with self._clock.phase("reuse"):
             self.store.update(batch.ids.cpu(), losses)
             self._policy_state = self._policy.update(
@@ -160,6 +121,15 @@ class TrainingStream(IterableDataset[Batch]):
                 large_step=batch.patches.large_step.cpu(),
             )
         self.counters.iteration += 1
+
+    def finish_rendering(self) -> None:
+        """Waits, in run time, for patches that others render; call it before the clock pauses.
+
+        They would go on rendering in time that does not count.
+        """
+        if self._ahead is not None and self._ahead.late:
+            with self._clock.phase("render"):
+                self._ahead.result()
 
     def log_row(self) -> dict[str, float | int | None]:
         """What the method did at this step: policy, store and chains; always the same keys."""
@@ -172,7 +142,7 @@ class TrainingStream(IterableDataset[Batch]):
             "store_mean_age": self.store.mean_age,
             "store_mean_loss": self.store.mean_loss,
             "non_finite_losses": self.store.non_finite_losses,
-            "resolution": self._batch_resolution,
+            "resolution": self._resolution,
             **vars(self.counters),
             "acceptance_rate": None if info is None else info.acceptance_rate,
             "large_step_acceptance_rate": None if info is None else info.large_step_acceptance_rate,
@@ -188,6 +158,7 @@ class TrainingStream(IterableDataset[Batch]):
             "chains": self._chains.state_dict(),
             "policy": self._policy_state.state_dict(),
             "generator": self._generator.get_state(),
+            "ahead": None if self._ahead is None else self._ahead.state_dict(),
             "store": self._saved_store,
         }
 
@@ -196,6 +167,8 @@ class TrainingStream(IterableDataset[Batch]):
         self._chains = ChainState.from_state_dict(state["chains"])
         self._policy_state = type(self._policy_state).from_state_dict(state["policy"])
         self._generator.set_state(state["generator"])
+        ahead = state["ahead"]
+        self._ahead = None if ahead is None else ProposalsAhead.from_state_dict(ahead)
         self._archive.restore(self.store, state["store"])
         self._saved_store = state["store"]
 
@@ -204,7 +177,8 @@ class TrainingStream(IterableDataset[Batch]):
         if self._saved_store is not None:
             self._archive.prune([self._saved_store])
 
-    def _next(self) -> tuple[Batch, Proposals | None]:
+    def _next(self) -> Batch:
+        ahead = self._propose()
         with self._clock.phase("reuse"):
             self.reuse_probability = self._policy.probability(
                 self._policy_state,
@@ -213,48 +187,55 @@ class TrainingStream(IterableDataset[Batch]):
                 store_capacity=self.store.capacity,
             )
             draw = torch.rand((), generator=self._generator, dtype=torch.float64)
-            if draw < self.reuse_probability:
+            if draw < self.reuse_probability or self._postpone(ahead):
                 ids = self.store.draw(self.sampler.chains, self._generator)
-                return Batch(self.store.get(ids), ids, generated=False, current=None), None
-        return self._generate()
+                return Batch(self.store.get(ids), ids, generated=False, current=None)
+        return self._generate(ahead)
 
-    def _generate(self) -> tuple[Batch, Proposals]:
-        with self._clock.phase("explore"):
-            proposals = self.sampler.propose(self._chains, self._generator)
-            seed = int(torch.randint(2**31, (), generator=self._generator))
+    def _propose(self) -> ProposalsAhead:
+        """The proposals under way, drawn where there are none, and started where nobody is at it.
+
+        What is drawn, and when, does not depend on where and how fast it is rendered.
+        """
+        if self._ahead is None:
+            with self._clock.phase("explore"):
+                self._ahead = ProposalsAhead(
+                    self.sampler.propose(self._chains, self._generator),
+                    resolution=self._schedule.resolution(self.counters.iteration),
+                    seed=int(torch.randint(2**31, (), generator=self._generator)),
+                )
+        self._resolution = self._ahead.resolution
         with self._clock.phase("render"):
-            rendered = self._renderer.render_patches(
-                proposals.position, resolution=self.resolution, seed=seed
-            )
-        patches = Patches(
-            scene_vector=proposals.position[:, :-2],
-            position=proposals.position[:, -2:],
-            resolution=torch.full((len(proposals.position),), self.resolution),
-            large_step=proposals.large_step,
-            buffers=rendered.buffers,
-            log_radiance=rendered.log_radiance,
-        )
-        self.counters.generated_batches += 1
-        self.counters.patches_traced += len(patches)
-        self.counters.paths_traced += rendered.paths
-        self.counters.patches_repaired += rendered.repaired
-        self.counters.patches_masked += rendered.masked
+            self._ahead.start(self._renderer)
+        return self._ahead
+
+    def _postpone(self, ahead: ProposalsAhead) -> bool:
+        postponed = self._when_late == "reuse" and self.reuse_probability > 0 and ahead.late
+        self.counters.batches_postponed += postponed
+        return postponed
+
+    def _generate(self, ahead: ProposalsAhead) -> Batch:
+        with self._clock.phase("render"):
+            rendered = ahead.result()
+        self.counters.count_generated(rendered)
         with self._clock.phase("reuse"):
-            ids = self.store.add(patches)
+            ids = self.store.add(ahead.patches())
             patches = self.store.get(ids)  # in the precision of every later look at them
             score_current = self.sampler.needs_current and bool(self._chains.occupied.all())
             current = self.store.get(self._chains.patch) if score_current else None
-        return Batch(patches, ids, generated=True, current=current), proposals
+        return Batch(patches, ids, generated=True, current=current)
 
-    def _accept(self, batch: Batch, proposals: Proposals, feedback: Feedback) -> None:
+    def _accept(self, batch: Batch, feedback: Feedback) -> None:
+        assert self._ahead is not None
         unscored = torch.zeros(self.sampler.chains)  # looked at by no rule
         proposed, current = feedback.target_proposed, feedback.target_current
         self._chains, self._chain_info = self.sampler.accept(
             self._chains,
-            proposals,
+            self._ahead.proposals,
             batch.ids,
             target_current=unscored if current is None else current,
             target_proposed=unscored if proposed is None else proposed(),
             generator=self._generator,
         )
+        self._ahead = None
         self.store.pin(self._chains.patch)

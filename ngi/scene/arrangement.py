@@ -1,11 +1,10 @@
-"""Arranges a scene's shapes so that moving one of them costs as little as Mitsuba lets it.
+"""Arranges a scene's shapes so that moving one of them costs as little as possible.
 
-When any shape changes, Mitsuba rebuilds the acceleration structure over all shapes at the top
-level, with Embree at its highest quality. In a scene of large meshes, what never moves is therefore
-put behind one instance: Mitsuba 3.9 rebuilds that one's structure too where Embree traces, but
-two to three times faster. In a scene of small ones the detour through the instance would cost more
-than it saves. A mesh that moves as a whole becomes an instance, so that its vertices are never
-rewritten.
+When a shape moves, Embree builds the structure over everything at the top level again, at its
+highest quality; groups are left alone (see `ngi.scene.acceleration`). In a scene of large meshes,
+what never moves is therefore put behind one instance. In a scene of small ones, the detour of every
+ray through the instance would cost more than it saves. A mesh that moves as a whole becomes an
+instance, so that its vertices are never rewritten.
 """
 
 from __future__ import annotations

@@ -20,6 +20,7 @@ from tests.learn.command_line import BRIEF, run
         (["tracker=wandb", "tracker.mode=maybe"], ["tracker.mode", "maybe"]),
         (["run.lpips_weights=/nowhere.pth"], ["nowhere.pth"]),
         (["renderer.patch_size=8"], ["window", "8 x 8"]),
+        (["reuse.when_late=maybe"], ["reuse.when_late", "maybe"]),
         (["optimizer._target_=torch.optim.AdamW"], ["Adam", "AdamW"]),
         (["optimizer.lr=-1"], ["learning rate", "-1"]),
     ],

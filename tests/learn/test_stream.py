@@ -1,71 +1,13 @@
 """The stream alone: a made-up training step answers each batch."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 import torch
 
-from ngi.explore import (
-    Always,
-    ConstantResolution,
-    ConstantTarget,
-    Greedy,
-    GrowingResolution,
-    Loss,
-    MarkovChains,
-    NormalPerturbation,
-    ResolutionSchedule,
-)
-from ngi.learn.clock import PhaseClock
-from ngi.learn.stream import Batch, Feedback, TrainingStream
-from ngi.render import AnalyticRenderer
-from ngi.reuse import FixedProbability, Never, PatchArchive, PatchStore, ReusePolicy, UntilFull
-
-CHAINS = 4
-
-
-def make(
-    folder: Path,
-    *,
-    greedy: bool = True,
-    policy: ReusePolicy | None = None,
-    schedule: ResolutionSchedule | None = None,
-    capacity: int = 64,
-    seed: int = 0,
-) -> TrainingStream:
-    renderer = AnalyticRenderer(dimensions=3, patch_size=8)
-    return TrainingStream(
-        renderer=renderer,
-        sampler=MarkovChains(
-            chains=CHAINS,
-            proposal=NormalPerturbation(large_step_probability=0.3, standard_deviation=0.05),
-            target=Loss() if greedy else ConstantTarget(),
-            acceptance=Greedy(accept_equal=False) if greedy else Always(),
-        ),
-        store=PatchStore(capacity=capacity, layout=renderer.layout),
-        archive=PatchArchive(folder),
-        policy=policy or FixedProbability(bootstrap_batches=3, probability=0.5),
-        schedule=schedule or ConstantResolution(resolution=24),
-        clock=PhaseClock(),
-        seed=seed,
-    )
-
-
-def answer(batch: Batch) -> Feedback:
-    """A loss that depends on the patch alone."""
-    losses = batch.patches.log_radiance.mean(dim=(1, 2, 3))
-    if batch.current is None:
-        return Feedback(losses, None, None)
-    return Feedback(losses, lambda: losses, batch.current.log_radiance.mean(dim=(1, 2, 3)))
-
-
-def steps(stream: TrainingStream, count: int) -> Iterator[Batch]:
-    batches = iter(stream)
-    for _ in range(count):
-        batch = next(batches)
-        yield batch
-        stream.feedback(answer(batch))
+from ngi.explore import ConstantResolution, GrowingResolution
+from ngi.reuse import Never, UntilFull
+from tests.learn.small_stream import CHAINS, make, steps
 
 
 def test_first_batches_are_new_and_later_ones_are_not_all(tmp_path: Path) -> None:
@@ -168,3 +110,8 @@ def test_log_columns_do_not_change(tmp_path: Path) -> None:
     for _ in steps(stream, 10):
         pass
     assert stream.log_row().keys() == first
+
+
+def test_an_unknown_word_for_late_patches_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"reuse\.when_late: 'skip'.*\['wait', 'reuse'\]"):
+        make(tmp_path, when_late="skip")

@@ -1,0 +1,81 @@
+"""Proposals whose patches are rendered while the network trains on stored ones.
+
+The chains stand still while patches are reused, so that where they propose to go next is known as
+soon as they have accepted or rejected the last proposals. Rendered early or late, in this process
+or by others, these give the same patches: what changes is how long training waits for them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Self
+
+import torch
+
+from ngi.explore import Proposals
+from ngi.patches import Patches
+from ngi.render.protocol import PatchJob, RenderedPatches, Renderer
+
+
+@dataclass
+class ProposalsAhead:
+    """The next proposals of n chains, on their way to being patches.
+
+    resolution: pixels along a side of the virtual image that the patches are cut from
+    seed: of their rendering
+    job: their rendering, None until `start`
+    """
+
+    proposals: Proposals
+    resolution: int
+    seed: int
+    job: PatchJob | None = None
+
+    def start(self, renderer: Renderer) -> None:
+        """Has the patches rendered; nothing happens the second time."""
+        if self.job is None:
+            self.job = renderer.start_patches(
+                self.proposals.position, resolution=self.resolution, seed=self.seed
+            )
+
+    @property
+    def late(self) -> bool:
+        """Whether others are still rendering them."""
+        return self.job is not None and not self.job.done()
+
+    def result(self) -> RenderedPatches:
+        """What was rendered, waited for. Raises RuntimeError before `start`."""
+        if self.job is None:
+            raise RuntimeError("patches that nobody renders are waited for; call start() first")
+        return self.job.result()
+
+    def patches(self) -> Patches:
+        """[n] the proposals with what was rendered, waited for; raises as `result` does."""
+        rendered = self.result()
+        position = self.proposals.position
+        return Patches(
+            scene_vector=position[:, :-2],
+            position=position[:, -2:],
+            resolution=torch.full((len(position),), self.resolution),
+            large_step=self.proposals.large_step,
+            buffers=rendered.buffers,
+            log_radiance=rendered.log_radiance,
+        )
+
+    def state_dict(self) -> dict[str, Any]:
+        """What has to be rendered, not what has been: that is rendered again."""
+        return {
+            "position": self.proposals.position,
+            "large_step": self.proposals.large_step,
+            "resolution": self.resolution,
+            "seed": self.seed,
+        }
+
+    @classmethod
+    def from_state_dict(cls, state: dict[str, Any]) -> Self:
+        """The same proposals, not started."""
+        return cls(
+            Proposals(position=state["position"], large_step=state["large_step"]),
+            resolution=state["resolution"],
+            seed=state["seed"],
+        )

@@ -1,0 +1,69 @@
+"""A small stream on closed formulas, and a made-up training step that answers its batches."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from ngi.explore import (
+    Always,
+    ConstantResolution,
+    ConstantTarget,
+    Greedy,
+    Loss,
+    MarkovChains,
+    NormalPerturbation,
+    ResolutionSchedule,
+)
+from ngi.learn.batch import Batch, Feedback
+from ngi.learn.clock import PhaseClock
+from ngi.learn.stream import TrainingStream
+from ngi.render import AnalyticRenderer
+from ngi.reuse import FixedProbability, PatchArchive, PatchStore, ReusePolicy
+
+CHAINS = 4
+
+
+def make(
+    folder: Path,
+    *,
+    greedy: bool = True,
+    policy: ReusePolicy | None = None,
+    schedule: ResolutionSchedule | None = None,
+    capacity: int = 64,
+    seed: int = 0,
+    renderer: AnalyticRenderer | None = None,
+    when_late: str = "wait",
+    clock: PhaseClock | None = None,
+) -> TrainingStream:
+    renderer = renderer or AnalyticRenderer(dimensions=3, patch_size=8)
+    return TrainingStream(
+        renderer=renderer,
+        sampler=MarkovChains(
+            chains=CHAINS,
+            proposal=NormalPerturbation(large_step_probability=0.3, standard_deviation=0.05),
+            target=Loss() if greedy else ConstantTarget(),
+            acceptance=Greedy(accept_equal=False) if greedy else Always(),
+        ),
+        store=PatchStore(capacity=capacity, layout=renderer.layout),
+        archive=PatchArchive(folder),
+        policy=policy or FixedProbability(bootstrap_batches=3, probability=0.5),
+        schedule=schedule or ConstantResolution(resolution=24),
+        clock=clock or PhaseClock(),
+        seed=seed,
+        when_late=when_late,
+    )
+
+
+def answer(batch: Batch) -> Feedback:
+    """A loss that depends on the patch alone."""
+    losses = batch.patches.log_radiance.mean(dim=(1, 2, 3))
+    if batch.current is None:
+        return Feedback(losses, None, None)
+    return Feedback(losses, lambda: losses, batch.current.log_radiance.mean(dim=(1, 2, 3)))
+
+
+def steps(stream: TrainingStream, count: int) -> Iterator[Batch]:
+    batches = iter(stream)
+    for _ in range(count):
+        batch = next(batches)
+        yield batch
+        stream.feedback(answer(batch))

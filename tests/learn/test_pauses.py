@@ -1,0 +1,72 @@
+"""Before the clock pauses, patches under way are waited for in run time."""
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from ngi.learn import PhaseClock, Steps, TrainingStream
+from ngi.learn.callbacks import BudgetAndCheckpoint, PeriodicEvaluation
+from ngi.reuse import FixedProbability
+from tests.learn.late_renderers import Manual, ManualJob
+from tests.learn.small_stream import make, steps
+
+HARDLY_EVER = FixedProbability(bootstrap_batches=3, probability=1e-12)
+
+
+def late(folder: Path) -> tuple[TrainingStream, ManualJob, PhaseClock]:
+    """A stream with 5 steps behind it and a job that takes 5 s under way."""
+    renderer = Manual()
+    clock = PhaseClock(timer=renderer.timer)
+    stream = make(folder, policy=HARDLY_EVER, renderer=renderer, when_late="reuse", clock=clock)
+    for _ in steps(stream, 5):
+        pass
+    assert not renderer.jobs[-1].done()
+    clock.load_state_dict(dict.fromkeys(clock.seconds, 0.0))
+    clock.start()
+    return stream, renderer.jobs[-1], clock
+
+
+def test_an_evaluation_waits_in_run_time_for_patches_under_way(tmp_path: Path) -> None:
+    stream, job, clock = late(tmp_path)
+    seen = []
+    recorder: Any = SimpleNamespace(evaluate=lambda: seen.append(job.done()))
+    evaluation = PeriodicEvaluation(
+        recorder=recorder, count=2, budget=Steps(steps=8), stream=stream, clock=clock
+    )
+    evaluation.on_train_batch_end()
+    assert seen == [True]
+    assert clock.seconds["render"] == clock.run_seconds == 5
+
+
+@pytest.mark.parametrize(("budget", "waits"), [(8, True), (5, False)])
+def test_a_checkpoint_waits_for_patches_unless_the_run_is_over(
+    tmp_path: Path, budget: int, waits: bool
+) -> None:
+    stream, job, clock = late(tmp_path)
+    seen = []
+    folder: Any = SimpleNamespace(
+        path=tmp_path / "run",
+        checkpoint=tmp_path / "last.ckpt",
+        steps=SimpleNamespace(flush=lambda: None),
+        metrics=SimpleNamespace(flush=lambda: None),
+    )
+    trainer: Any = SimpleNamespace(
+        should_stop=False, save_checkpoint=lambda _: seen.append(job.done())
+    )
+    callback = BudgetAndCheckpoint(
+        budget=Steps(steps=budget),
+        stream=stream,
+        clock=clock,
+        folder=folder,
+        every_seconds=1e9,
+        every_steps=5,
+    )
+    callback.on_train_start(trainer)
+    module: Any = None
+    callback.on_train_batch_end(trainer, module, {"loss": 1.0})
+    callback.on_train_end()
+    assert seen == [waits]
+    assert clock.run_seconds == (5 if waits else 0)
+    assert trainer.should_stop == (not waits)
