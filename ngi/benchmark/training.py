@@ -6,14 +6,15 @@ from collections.abc import Callable
 
 import torch
 
+from ngi.benchmark import PATCH_SIZE, PATCHES
 from ngi.benchmark.figures import Figure, figure, in_turn, ratio
-from ngi.explore import LossTimesOutputGradient, LossTimesStep
+from ngi.explore import LossTimesOutputGradient, LossTimesStep, Target
 from ngi.learn import PhaseClock, Scorer
 from ngi.models import L1Dssim, PatchLinear, PixelGenerator
 from ngi.patches import BufferLayout, Patches
 
-PATCHES = 16
-PATCH_SIZE = 32
+DIMENSIONS = 12
+"""Of the scene vector."""
 
 
 def random_patches(layout: BufferLayout, dimensions: int, count: int = PATCHES) -> Patches:
@@ -29,59 +30,70 @@ def random_patches(layout: BufferLayout, dimensions: int, count: int = PATCHES) 
     )
 
 
-def training(
-    features: int, layers: int, bf16: bool, repeats: int, dimensions: int = 12
-) -> list[Figure]:
+class Training:
+    """Training steps of a network on one batch of random patches, on the GPU where there is one.
+
+    bf16: whether the products run in bfloat16.
+    """
+
+    def __init__(self, features: int, layers: int, *, bf16: bool) -> None:
+        self.device = "cuda" if torch.cuda.is_available() else "cpu"
+        self.bf16 = bf16
+        layout = BufferLayout()
+        self.network = PixelGenerator(
+            layout=layout,
+            scene_dimensions=DIMENSIONS,
+            hidden_features=features,
+            hidden_layers=layers,
+        ).to(self.device)
+        self.optimizer = torch.optim.Adam(self.network.parameters(), lr=1e-4)
+        self.loss = L1Dssim(l1_weight=1.0, dssim_weight=1.0)
+        self.patches = random_patches(layout, DIMENSIONS).to(self.device)
+
+    def step(self) -> None:
+        self.optimizer.zero_grad()
+        with torch.autocast(self.device, torch.bfloat16, enabled=self.bf16):
+            prediction = self.network(self.patches.buffers, self.patches.scene_vector)
+        self.loss(prediction, self.patches.log_radiance).mean().backward()
+        self.optimizer.step()
+
+    def step_with(self, target: Target) -> Callable[[], None]:
+        """A step that scores the batch as proposals and, in a pass of its own, as the current."""
+        patches = self.patches
+        scorer = Scorer(target=target, network=self.network, loss=self.loss, clock=PhaseClock())
+
+        def scored_step() -> None:
+            self.optimizer.zero_grad()
+            with torch.autocast(self.device, torch.bfloat16, enabled=self.bf16):
+                with scorer.watch(patches, patches, self.optimizer) as score:
+                    prediction = self.network(patches.buffers, patches.scene_vector)
+                    losses = self.loss(prediction, patches.log_radiance)
+                proposed, _ = score(prediction, losses)
+            losses.mean().backward()
+            proposed()
+            self.optimizer.step()
+
+        return scored_step
+
+
+def training(features: int, layers: int, bf16: bool, repeats: int) -> list[Figure]:
     """A training step against the matrix rate, and scoring against a training step."""
-    device = "cuda" if torch.cuda.is_available() else "cpu"
-    dtype = torch.bfloat16 if bf16 else torch.float32
-    layout = BufferLayout()
-    network = PixelGenerator(
-        layout=layout, scene_dimensions=dimensions, hidden_features=features, hidden_layers=layers
-    ).to(device)
-    optimizer = torch.optim.Adam(network.parameters(), lr=1e-4)
-    loss = L1Dssim(l1_weight=1.0, dssim_weight=1.0)
-    patches = random_patches(layout, dimensions).to(device)
+    ours = Training(features, layers, bf16=bf16)
     pixels = PATCHES * PATCH_SIZE**2
-
-    def step() -> None:
-        optimizer.zero_grad()
-        with torch.autocast(device, torch.bfloat16, enabled=bf16):
-            prediction = network(patches.buffers, patches.scene_vector)
-        loss(prediction, patches.log_radiance).mean().backward()
-        optimizer.step()
-
-    left = torch.rand(pixels, features, device=device, dtype=dtype)
-    right = torch.rand(features, features, device=device, dtype=dtype)
+    dtype = torch.bfloat16 if bf16 else torch.float32
+    left = torch.rand(pixels, features, device=ours.device, dtype=dtype)
+    right = torch.rand(features, features, device=ours.device, dtype=dtype)
     products = 3 * layers
 
     def matrix_products() -> None:
         for _ in range(products):
             left @ right
 
-    clock = PhaseClock()
-
-    def step_with(target: LossTimesStep | LossTimesOutputGradient) -> Callable[[], None]:
-        scorer = Scorer(target=target, network=network, loss=loss, clock=clock)
-
-        def scored_step() -> None:
-            optimizer.zero_grad()
-            with torch.autocast(device, torch.bfloat16, enabled=bf16):
-                with scorer.watch(patches, patches, optimizer) as score:
-                    prediction = network(patches.buffers, patches.scene_vector)
-                    losses = loss(prediction, patches.log_radiance)
-                proposed, _ = score(prediction, losses)
-            losses.mean().backward()
-            proposed()
-            optimizer.step()
-
-        return scored_step
-
     steps, matrices, adam, cheap = in_turn(
-        repeats, f"training, {layers}x{features}", step, matrix_products,
-        step_with(LossTimesStep()), step_with(LossTimesOutputGradient()),
+        repeats, f"training, {layers}x{features}", ours.step, matrix_products,
+        ours.step_with(LossTimesStep()), ours.step_with(LossTimesOutputGradient()),
     )  # fmt: skip
-    operations = training_operations(network)
+    operations = training_operations(ours.network)
     peak = [2 * pixels * features**2 * products / t for t in matrices]
     name = f"{layers}x{features} {'bf16' if bf16 else 'fp32'}"
     half = "≥ 50 %" if bf16 and features == 512 else ""
@@ -93,6 +105,21 @@ def training(
         figure(f"step with scoring, loss × step / step ({name})", ratio(adam, steps), "×"),
         figure(f"step with scoring, output gradient / step ({name})", ratio(cheap, steps), "×"),
     ]  # fmt: skip
+
+
+def scoring_seconds(
+    target: Target, repeats: int, *, features: int = 512, layers: int = 8, bf16: bool = True
+) -> list[float]:
+    """What scoring 16 proposals and 16 current states adds to a training step, in seconds.
+
+    Each is the difference between two steps timed in turn, one with scoring and one without; a
+    GPU is waited for.
+    """
+    ours = Training(features, layers, bf16=bf16)
+    steps, scored = in_turn(
+        repeats, f"scoring, {layers}x{features}", ours.step, ours.step_with(target)
+    )
+    return [a - b for a, b in zip(scored, steps, strict=True)]
 
 
 def training_operations(network: PixelGenerator) -> int:

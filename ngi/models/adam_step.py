@@ -54,22 +54,23 @@ class AdamStep:
             second_gain=self.second_gain * factor**2,
         )
 
-    def columns(self, start: int, stop: int) -> Self:
-        """The step of these columns of a weight alone."""
-        return replace(
-            self,
-            first=self.first[:, start:stop].contiguous(),
-            second=self.second[:, start:stop].contiguous(),
-        )
-
     def squared_norm(self, gradients: Tensor) -> Tensor:
-        """‖step(g_i)‖² of n gradients [n, *parameter.shape] of any precision, [n]."""
-        g = gradients.to(self.first.dtype)
+        """‖step(g_i)‖² of n gradients [n, *parameter.shape], [n]."""
+        chunks = gradients.split(_gradients_per_chunk(self.first))
+        norm = self.learning_rate * torch.cat([self._norm(g) for g in chunks])
+        return norm * norm
+
+    def _norm(self, g: Tensor) -> Tensor:
         denominator = torch.addcmul(self.second, g, g, value=self.second_gain)
         denominator.sqrt_().add_(self.epsilon)
         step = torch.add(self.first, g, alpha=self.first_gain).div_(denominator)
-        norm = self.learning_rate * torch.linalg.vector_norm(step.flatten(1), dim=1)
-        return norm * norm
+        return torch.linalg.vector_norm(step.flatten(1), dim=1)
+
+
+def _gradients_per_chunk(parameter: Tensor) -> int:
+    """How many gradients to treat at a time: on a CPU as many as stay in its cache."""
+    elements = 2**20 if parameter.device.type == "cpu" else 2**26
+    return max(1, elements // max(1, parameter.numel()))
 
 
 def adam_groups(optimizer: torch.optim.Optimizer) -> dict[Tensor, dict[str, Any]]:

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
+from torch.autograd.function import once_differentiable
+
+SampleGradients = Callable[[Tensor, Tensor], None]
+"""Is shown the gradients of a weight and a bias for each sample, [n, out, in] and [n, out]."""
 
 
 class PatchLinear(nn.Linear):
@@ -18,6 +23,8 @@ class PatchLinear(nn.Linear):
     patch. (The release repeats v at every pixel.)
 
     weight: [out_features, sum(pixel_features) + scene_dimensions]; bias: [out_features]
+    watcher: while set, the backward pass forms the gradients of each sample, in the precision of
+        the products, shows them to it and sums them up to those of the batch
     """
 
     def __init__(
@@ -25,6 +32,7 @@ class PatchLinear(nn.Linear):
     ) -> None:
         super().__init__(sum(pixel_features) + scene_dimensions, out_features)
         self.widths = (*pixel_features, scene_dimensions)
+        self.watcher: SampleGradients | None = None
 
     def forward(self, pixels: Sequence[Tensor], scene_vector: Tensor) -> Tensor:  # type: ignore[override]
         """Tensors [n, p, features] for p pixels per patch and v [n, D] to [n, p, out_features].
@@ -33,21 +41,103 @@ class PatchLinear(nn.Linear):
         precision are not rounded to it: bfloat16 would move positions by up to 1/512 of the
         scene's box, and would take two scenes for one.
         """
-        *weights, scene_weight = self.weight.split(self.widths, dim=1)
-        output = _linear(pixels[0], weights[0])
-        for part, weight in zip(pixels[1:], weights[1:], strict=True):
-            output += _linear(part, weight)
-        with torch.autocast(scene_vector.device.type, enabled=False):
-            patch_bias = F.linear(scene_vector, scene_weight, self.bias)
-        output += patch_bias[:, None].to(output.dtype)
+        if self.watcher is None:
+            return _patch_linear(self.weight, self.bias, scene_vector, pixels)
+        output = _Watched.apply(self.watcher, self.weight, self.bias, *pixels, scene_vector)
+        assert isinstance(output, Tensor)
         return output
+
+
+class _Watched(torch.autograd.Function):
+    """`_patch_linear`, with a backward pass that has the gradients of each sample.
+
+    Their sum is the gradient of the batch, so that they cost no product of their own.
+    """
+
+    @staticmethod
+    def forward(
+        ctx: Any,
+        watcher: SampleGradients,
+        weight: Tensor,
+        bias: Tensor,
+        *inputs: Tensor,
+    ) -> Tensor:
+        ctx.watcher = watcher
+        ctx.save_for_backward(weight, *inputs)
+        *pixels, scene_vector = inputs
+        return _patch_linear(weight, bias, scene_vector, pixels)
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor | None, ...]:
+        weight, *pixels, scene_vector = ctx.saved_tensors
+        biases = gradient.sum(dim=1).to(weight.dtype)
+        weights = _sample_gradients(gradient, biases, scene_vector, pixels)
+        ctx.watcher(weights, biases)
+        of_inputs = [
+            of_output @ columns.to(of_output.dtype) if needed else None
+            for of_output, columns, needed in zip(
+                (*[gradient] * len(pixels), biases),
+                weight.split(_widths(scene_vector, pixels), dim=1),
+                ctx.needs_input_grad[3:],
+                strict=True,
+            )
+        ]
+        return None, weights.sum(dim=0), biases.sum(dim=0), *of_inputs
+
+
+def _patch_linear(
+    weight: Tensor, bias: Tensor, scene_vector: Tensor, pixels: Sequence[Tensor]
+) -> Tensor:
+    *weights, scene_weight = weight.split(_widths(scene_vector, pixels), dim=1)
+    output = _linear(pixels[0], weights[0])
+    for part, columns in zip(pixels[1:], weights[1:], strict=True):
+        output += _linear(part, columns)
+    with torch.autocast(scene_vector.device.type, enabled=False):
+        patch_bias = F.linear(scene_vector, scene_weight, bias)
+    output += patch_bias[:, None].to(output.dtype)
+    return output
+
+
+def _sample_gradients(
+    gradient: Tensor, biases: Tensor, scene_vector: Tensor, pixels: Sequence[Tensor]
+) -> Tensor:
+    """Gradients of the weight for each sample, [n, out_features, in_features].
+
+    For the columns of pixel features they are gradientᵀ · features, all in one product; for those
+    of v, the same at every pixel, an outer product.
+    gradient: of the output, [n, p, out_features]; biases: its sum over the pixels
+    """
+    parts = [_in_precision(part, gradient.dtype) for part in pixels]
+    products = gradient.mT @ torch.cat([term for terms in parts for term in terms], dim=-1)
+    of_parts = products.split([sum(term.shape[-1] for term in terms) for terms in parts], dim=-1)
+    weights = biases.new_empty(*biases.shape, sum(_widths(scene_vector, pixels)))
+    *of_pixels, of_scene = weights.split(_widths(scene_vector, pixels), dim=-1)
+    for columns, of_part, terms in zip(of_pixels, of_parts, parts, strict=True):
+        first, *rest = of_part.chunk(len(terms), dim=-1)
+        columns.copy_(first)
+        for of_term in rest:
+            columns += of_term
+    torch.mul(biases[:, :, None], scene_vector[:, None], out=of_scene)
+    return weights
+
+
+def _widths(scene_vector: Tensor, pixels: Sequence[Tensor]) -> list[int]:
+    return [*(part.shape[-1] for part in pixels), scene_vector.shape[-1]]
 
 
 def _linear(x: Tensor, weight: Tensor) -> Tensor:
     """Product x · weightᵀ; under autocast, float32 x enters as the sum of two numbers."""
     device = x.device.type
     if torch.is_autocast_enabled(device) and x.dtype == torch.float32:
-        high = x.to(torch.get_autocast_dtype(device))
-        low = (x - high).to(high.dtype)
-        return F.linear(torch.cat([high, low], dim=-1), torch.cat([weight, weight], dim=1))
+        terms = _in_precision(x, torch.get_autocast_dtype(device))
+        return F.linear(torch.cat(terms, dim=-1), torch.cat([weight, weight], dim=1))
     return F.linear(x, weight)
+
+
+def _in_precision(x: Tensor, dtype: torch.dtype) -> list[Tensor]:
+    """Tensors of this precision whose sum is x: where x is more precise, two of them."""
+    if x.dtype == dtype:
+        return [x]
+    high = x.to(dtype)
+    return [high, (x - high).to(high.dtype)]

@@ -13,7 +13,7 @@ from torch import Tensor, nn
 
 from ngi.models.adam_step import AdamStep, adam_groups
 from ngi.models.loss import SampleLoss
-from ngi.models.patch_linear import PatchLinear
+from ngi.models.patch_linear import PatchLinear, SampleGradients
 
 
 def output_gradient_norm(prediction: Tensor, target: Tensor, loss: SampleLoss) -> Tensor:
@@ -60,7 +60,6 @@ def adam_step_norm(
         losses = loss(model(buffers, scene_vector), target)
         total = losses.sum()
     with torch.autocast(buffers.device.type, enabled=False):
-        # Asked for the biases alone, autograd visits every layer but forms no weight's gradient.
         torch.autograd.grad(total, [layer.bias for layer in _patch_linear_layers(model)])
     return losses.detach(), step_norms()
 
@@ -75,6 +74,8 @@ def step_norms_in_backward(
 ) -> Iterator[Callable[[], Tensor]]:
     """Has a training step's own backward pass measure what each of its samples would do.
 
+    That pass then forms the gradients of each sample and sums them up to those of the batch, which
+    are the same as without, up to rounding.
     The model is called once inside the block. Gives a function that returns the norms of
     `adam_step_norm`, [n], to be called when the backward pass is over and the optimiser has not
     stepped yet or has: what it was before is what counts.
@@ -93,26 +94,23 @@ def step_norms_in_backward(
         )
     squared_norms: list[Tensor] = []
 
-    def watch(
-        layer: PatchLinear, arguments: tuple[tuple[Tensor, ...], Tensor], output: Tensor
-    ) -> None:
-        def add_squared_norm(gradient: Tensor) -> None:
+    def watcher(layer: PatchLinear) -> SampleGradients:
+        def add_squared_norms(*gradients: Tensor) -> None:
             with around(), torch.no_grad():
-                weight_step, bias_step = (
-                    AdamStep.of(p, groups[p], optimizer.state.get(p, {})).scaled(gradient_scale)
-                    for p in (layer.weight, layer.bias)
-                )
-                pixels, v = arguments
-                squared_norms.append(_squared_norm(weight_step, bias_step, pixels, v, gradient))
+                for parameter, g in zip((layer.weight, layer.bias), gradients, strict=True):
+                    state = optimizer.state.get(parameter, {})
+                    step = AdamStep.of(parameter, groups[parameter], state).scaled(gradient_scale)
+                    squared_norms.append(step.squared_norm(g))
 
-        output.register_hook(add_squared_norm)
+        return add_squared_norms
 
-    handles = [layer.register_forward_hook(watch) for layer in layers]
+    for layer in layers:
+        layer.watcher = watcher(layer)
     try:
         yield lambda: torch.stack(squared_norms).sum(dim=0).sqrt()
     finally:
-        for handle in handles:
-            handle.remove()
+        for layer in layers:
+            layer.watcher = None
 
 
 def _patch_linear_layers(model: nn.Module) -> list[PatchLinear]:
@@ -126,39 +124,3 @@ def _patch_linear_layers(model: nn.Module) -> list[PatchLinear]:
                 "step norm"
             )
     return layers
-
-
-def _squared_norm(
-    weight_step: AdamStep,
-    bias_step: AdamStep,
-    pixels: tuple[Tensor, ...],
-    scene_vector: Tensor,
-    output_gradient: Tensor,
-) -> Tensor:
-    """Squared norm of one layer's step for each sample, [n].
-
-    output_gradient: [n, p, out_features]. The gradient of the weight's columns for one part of
-    the input is output_gradientᵀ · part; for v, the same at every pixel, it is an outer product.
-    """
-    bias_gradient = output_gradient.sum(dim=1).to(scene_vector.dtype)
-    parts = [(output_gradient, part.to(output_gradient.dtype)) for part in pixels]
-    parts.append((bias_gradient[:, None], scene_vector[:, None]))
-    total = bias_step.squared_norm(bias_gradient)
-    start = 0
-    for gradient, part in parts:
-        columns = weight_step.columns(start, start + part.shape[-1])
-        start += part.shape[-1]
-        samples = _samples_per_chunk(columns)
-        total += torch.cat(
-            [
-                columns.squared_norm(g.mT @ p)
-                for g, p in zip(gradient.split(samples), part.split(samples), strict=True)
-            ]
-        )
-    return total
-
-
-def _samples_per_chunk(step: AdamStep) -> int:
-    """How many gradients to treat at a time: on a CPU as many as stay in its cache."""
-    elements = 2**18 if step.first.device.type == "cpu" else 2**26
-    return max(1, elements // max(1, step.first.numel()))

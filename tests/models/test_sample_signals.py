@@ -7,13 +7,14 @@ from torch.func import grad, vmap
 
 from ngi.models import (
     L1Dssim,
+    PatchLinear,
+    adam_step,
     adam_step_norm,
     output_gradient_norm,
-    sample_signals,
     step_norms_in_backward,
 )
 
-from .conftest import plain_forward
+from .conftest import Batch, plain_forward
 
 LOSS = L1Dssim(l1_weight=1, dssim_weight=1, window_size=5)
 
@@ -32,6 +33,10 @@ def train(model, optimizer, batch, steps) -> None:
 
 def step_norms(model, optimizer, batch, loss=LOSS):
     return adam_step_norm(model, loss, optimizer, batch.buffers, batch.scene_vector, batch.target)
+
+
+def watched_layers(model) -> list[nn.Module]:
+    return [module for module in model.modules() if getattr(module, "watcher", None) is not None]
 
 
 def real_step_norms(model, optimizer, batch):
@@ -117,7 +122,7 @@ def test_chunks_change_nothing(make_model, make_batch, monkeypatch, samples) -> 
     batch = make_batch(model)
     optimizer = adam(model)
     _, expected = step_norms(model, optimizer, batch)
-    monkeypatch.setattr(sample_signals, "_samples_per_chunk", lambda _: samples)
+    monkeypatch.setattr(adam_step, "_gradients_per_chunk", lambda _: samples)
     torch.testing.assert_close(step_norms(model, optimizer, batch)[1], expected)
 
 
@@ -144,18 +149,18 @@ def test_leaves_everything_as_it_was(make_model, make_batch) -> None:
     assert not losses.requires_grad
     assert not norms.requires_grad
     assert all(p.grad is None for p in model.parameters())
-    assert not any(module._forward_hooks for module in model.modules())
+    assert not watched_layers(model)
     assert len(optimizer.state) == 0
     for a, b in zip(before[0].values(), model.state_dict().values(), strict=True):
         assert torch.equal(a, b)
 
 
-def test_hooks_are_gone_after_an_error(make_model, make_batch) -> None:
+def test_nothing_watches_after_an_error(make_model, make_batch) -> None:
     model = make_model()
     batch = make_batch(model, height=4)
     with pytest.raises(ValueError, match="smaller than the SSIM window"):
         step_norms(model, adam(model), batch)
-    assert not any(module._forward_hooks for module in model.modules())
+    assert not watched_layers(model)
 
 
 @pytest.mark.parametrize("option", ["weight_decay", "amsgrad", "maximize"])
@@ -197,6 +202,59 @@ def test_output_gradient_norm_of_l1_in_closed_form() -> None:
     with torch.no_grad():
         norms = output_gradient_norm(prediction, target, loss)
     torch.testing.assert_close(norms, torch.full((4,), 2 / (12 * 12 * 3) ** 0.5))
+
+
+def gradients(model, batch) -> list[torch.Tensor]:
+    with torch.autocast("cpu", torch.bfloat16, enabled=model.input_layer.weight.dtype.itemsize < 8):
+        output = model(batch.buffers, batch.scene_vector)
+        losses = LOSS(output, batch.target)
+    inputs = [x for x in (batch.buffers, batch.scene_vector) if x.requires_grad]
+    return [output, *torch.autograd.grad(losses.mean(), [*model.parameters(), *inputs])]
+
+
+@pytest.mark.parametrize("options", [{}, {"position_preconditioning": False}])
+def test_a_watched_step_has_the_gradients_of_a_plain_one(make_model, make_batch, options) -> None:
+    model = make_model(**options).double()
+    batch = make_batch(model)
+    batch.buffers.requires_grad_()
+    batch.scene_vector.requires_grad_()
+    plain = gradients(model, batch)
+    with step_norms_in_backward(model, adam(model)):
+        watched = gradients(model, batch)
+    again = gradients(model, batch)
+    assert torch.equal(watched[0], plain[0])
+    torch.testing.assert_close(watched, plain, rtol=1e-12, atol=1e-15)
+    assert all(torch.equal(a, b) for a, b in zip(again, plain, strict=True))
+
+
+def test_a_watched_bfloat16_step_is_as_exact_as_a_plain_one(make_model, make_batch) -> None:
+    model = make_model(hidden_features=64)
+    batch = make_batch(model, height=16, width=16)
+    plain = gradients(model, batch)
+    with step_norms_in_backward(model, adam(model)):
+        watched = gradients(model, batch)
+    model.double()
+    exact = gradients(model, Batch(*(x.double() for x in vars(batch).values())))
+    assert torch.equal(watched[0], plain[0])
+    for a, b, truth in zip(watched[1:], plain[1:], exact[1:], strict=True):
+        assert (a - truth).norm() <= 1.1 * (b - truth).norm() + 1e-6 * truth.norm()
+
+
+def test_positions_keep_their_precision_in_a_watched_bfloat16_step() -> None:
+    layer = PatchLinear(pixel_features=[3, 2], scene_dimensions=1, out_features=4)
+    generator = torch.Generator().manual_seed(5)
+    features = torch.rand(2, 6, 3, generator=generator).bfloat16()
+    positions, v = torch.rand(2, 6, 2, generator=generator), torch.rand(2, 1, generator=generator)
+    seen: list[torch.Tensor] = []
+    layer.watcher = lambda weights, biases: seen.extend([weights, biases])
+    with torch.autocast("cpu", torch.bfloat16):
+        output = layer((features, positions), v)
+    output[:, 0].sum().backward()  # of the first pixel alone: its inputs are the gradients
+    expected = torch.cat([features[:, 0].float(), positions[:, 0], v], dim=1)[:, None].expand(
+        2, 4, 6
+    )
+    torch.testing.assert_close(seen[0], expected, rtol=2**-15, atol=0)
+    torch.testing.assert_close(seen[1], torch.ones(2, 4))
 
 
 def test_a_training_step_measures_its_own_samples(make_model, make_batch) -> None:
