@@ -24,7 +24,7 @@ _PLACED = ("instance", "shapegroup", "sphere", "rectangle", "disk", "cylinder")
 """Shapes that have a to_world, and groups."""
 
 
-WORTHWHILE = 3_000_000
+WORTHWHILE = 100_000
 """Bytes of meshes that stay from which on they are put behind an instance."""
 
 

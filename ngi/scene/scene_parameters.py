@@ -122,7 +122,7 @@ class SceneParameters:
         kind = type(self._parameters[key])
         if value.shape == (4, 4):
             self._changes.place(self.owner(key), value)
-            new = kind(value) if mi.variant().startswith("scalar") else kind(mi.Matrix4f(value))
+            new = kind(mi.ScalarTransform4f(value))  # which inverts it, without a kernel
         elif value.ndim == 3 or value.size > 4:
             numbers = np.uint8 if kind.__name__ == "TensorXu8" else np.float32
             new = kind(np.ascontiguousarray(value, dtype=numbers))
