@@ -9,19 +9,14 @@ from torch import Tensor
 from ngi.backend import activate, describe, mi
 from ngi.render.first_hit import first_hit_of
 from ngi.render.jit_tracer import JitTracer
+from ngi.render.launches import SAMPLES_PER_PASS, bands, passes
 from ngi.render.needs import buffers_are_static
 from ngi.render.protocol import Deferred, RenderedPatches
 from ngi.render.render_inputs import check_states, patch_window, require_positive
 from ngi.render.scalar_tracer import ScalarTracer
-from ngi.render.tracing import Pending, Tracer, Window, derive_seed
+from ngi.render.tracing import Pending, Tracer, derive_seed
 from ngi.scene import SceneDescription
 from ngi.scene.variable_scene import VariableScene
-
-PATHS_PER_LAUNCH = 2**22
-"""Images and patches are traced in launches of about this many paths at most: about 200 MB."""
-
-SAMPLES_PER_PASS = 256
-"""Samples of an image's pixel that are summed in single precision before double takes over."""
 
 BUFFER_SAMPLES = {"cuda_ad_rgb": 16, "llvm_ad_rgb": 16, "scalar_rgb": 2}
 """Samples per pixel of the buffers by default; a Python loop takes them in the scalar variant."""
@@ -93,13 +88,18 @@ class MitsubaRenderer:
         self.dimensions = scene.dimensions
         self.patch_size = patch_size
         self.samples_per_pixel = samples_per_pixel or scene.samples_per_pixel
+        self._passes = passes(self.samples_per_pixel, patch_size**2)
         self.scene_hash = scene.scene_hash
         self.description = describe(self._variant)
 
     def warm_up(self) -> None:
-        """See `ngi.render.Renderer.warm_up`."""
-        middle = torch.full((2, self.dimensions + 2), 0.5)
-        self.render_patches(middle, resolution=2 * self.patch_size, seed=0)
+        """See `ngi.render.Renderer.warm_up`: two states, and of each size one launch."""
+        mi.set_variant(self._variant)
+        for value in (0.25, 0.75):
+            state = torch.full((self.dimensions + 2,), value)
+            sizes = sorted(set(self._passes))
+            for pending in self._launch_patch(state, 2 * self.patch_size, 0, sizes=sizes):
+                pending()
 
     def render_patches(self, states: Tensor, *, resolution: int, seed: int) -> RenderedPatches:
         """See `ngi.render.Renderer.render_patches`.
@@ -109,13 +109,14 @@ class MitsubaRenderer:
         """
         check_states(states, self.dimensions)
         mi.set_variant(self._variant)
-        pending = [self._launch_patch(state, resolution, seed, attempt=0) for state in states]
+        sizes = self._passes
+        pending = [self._launch_patch(state, resolution, seed, sizes=sizes) for state in states]
         results, repaired, masked, renderings = [], 0, 0, len(states)
         for state, (radiance, buffers) in zip(states, pending, strict=True):
             patch = radiance(), buffers()
             if not _finite(*patch):
                 repaired, renderings = repaired + 1, renderings + 1
-                retry = self._launch_patch(state, resolution, seed, attempt=1)
+                retry = self._launch_patch(state, resolution, seed, sizes=sizes, attempt=1)
                 patch = retry[0](), retry[1]()
                 if not _finite(*patch):
                     masked += 1
@@ -148,16 +149,16 @@ class MitsubaRenderer:
         mi.set_variant(self._variant)
         self._scene.apply(scene_vector)
         state = np.asarray(scene_vector, dtype=np.float32).tobytes()
-        bands = []
-        for band in _bands(resolution, min(samples_per_pixel, SAMPLES_PER_PASS)):
+        rows = []
+        for band in bands(resolution, min(samples_per_pixel, SAMPLES_PER_PASS)):
             total = torch.zeros(band.height, resolution, 3, dtype=torch.float64)
             for start in range(0, samples_per_pixel, SAMPLES_PER_PASS):
                 samples = min(SAMPLES_PER_PASS, samples_per_pixel - start)
                 number = derive_seed(seed, state, resolution, band.y, start)
                 radiance = self._image_tracer.radiance(band, samples=samples, seed=number)()
                 total += samples * radiance.cpu().double()
-            bands.append(total / samples_per_pixel)
-        return torch.cat(bands).float()
+            rows.append(total / samples_per_pixel)
+        return torch.cat(rows).float()
 
     def image_buffers(self, scene_vector: Tensor, *, resolution: int) -> Tensor:
         """See `ngi.render.Renderer.image_buffers`; the same as a patch's at the same pixels."""
@@ -170,19 +171,24 @@ class MitsubaRenderer:
         """[10, D]: the scene's hard test frames (paper, Sec. 7.2.1)."""
         return torch.tensor(self._scene.description.hard_frames, dtype=torch.float32)
 
+    def close(self) -> None:
+        """See `ngi.render.Renderer.close`."""
+
     def _launch_patch(
-        self, state: Tensor, resolution: int, seed: int, *, attempt: int
+        self, state: Tensor, resolution: int, seed: int, *, sizes: list[int], attempt: int = 0
     ) -> tuple[Pending, Pending]:
+        """sizes: samples per pixel of each launch."""
         window = patch_window(state[-2:], patch_size=self.patch_size, resolution=resolution)
         self._scene.apply(state[:-2])
         parts = (seed, state.numpy().tobytes(), resolution, attempt)
-        passes = [
-            (samples, self._patch_tracer.radiance(window, samples=samples, seed=number))
-            for samples, number in _passes(self.samples_per_pixel, self.patch_size**2, parts)
+        launches = [
+            self._patch_tracer.radiance(window, samples=samples, seed=derive_seed(*parts, i))
+            for i, samples in enumerate(sizes)
         ]
 
         def radiance() -> Tensor:
-            return sum((n * mean() for n, mean in passes), torch.zeros(())) / self.samples_per_pixel
+            sums = [n * mean() for n, mean in zip(sizes, launches, strict=True)]
+            return torch.stack(sums).sum(dim=0) / sum(sizes)
 
         if not self._static:
             return radiance, self._patch_tracer.buffers(window)
@@ -195,8 +201,8 @@ class MitsubaRenderer:
 
     def _whole_buffers(self, resolution: int) -> Tensor:
         """[H, W, C] of the scene as it stands, emission linear; no NaN or Inf."""
-        bands = _bands(resolution, self._buffer_samples)
-        return torch.cat([_masked(self._image_tracer.buffers(band)()) for band in bands])
+        all_bands = bands(resolution, self._buffer_samples)
+        return torch.cat([_masked(self._image_tracer.buffers(band)()) for band in all_bands])
 
     def _encode(self, buffers: Tensor) -> Tensor:
         """Emission becomes log1p of its mean, in place."""
@@ -212,21 +218,6 @@ class MitsubaRenderer:
                 f"{path}: the film is {width} x {height}; make width and height equal, since the "
                 "virtual image is a square"
             )
-
-
-def _bands(resolution: int, samples: int) -> list[Window]:
-    rows = min(resolution, max(1, PATHS_PER_LAUNCH // (resolution * samples)))
-    return [
-        Window(0, y, resolution, min(rows, resolution - y), resolution)
-        for y in range(0, resolution, rows)
-    ]
-
-
-def _passes(samples: int, pixels: int, seed: tuple[int | bytes, ...]) -> list[tuple[int, int]]:
-    """Samples per pixel and seed of each launch: as few as `PATHS_PER_LAUNCH` allows, alike."""
-    count = -(-samples * pixels // PATHS_PER_LAUNCH)
-    sizes = [samples // count + (i < samples % count) for i in range(count)]
-    return [(size, derive_seed(*seed, i)) for i, size in enumerate(sizes)]
 
 
 def _finite(*tensors: Tensor) -> bool:
