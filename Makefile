@@ -31,7 +31,7 @@ smoke: setup
 	@$(BIN)/python -m ngi.train -m +sweeps=smoke
 	@$(BIN)/python -m analysis.report outputs/smoke
 
-benchmark: setup ## speed as ratios, with the machine's own limits measured beside
+benchmark: setup ## speed as ratios, with the machine's own limits measured beside: 15 minutes
 	@$(BIN)/python -m ngi.benchmark
 
 doctor: setup ## what this machine has, and how to get what is missing

@@ -61,7 +61,8 @@ def train(config: DictConfig) -> dict[str, Any]:
             return folder.result
         return _train(config, budget=budget, renderer=renderer, folder=folder, tracker=tracker)
     finally:
-        with ExitStack() as stack:  # closes both whatever happens in either
+        with ExitStack() as stack:  # closes each, whatever happens in the others
+            stack.callback(renderer.close)
             stack.callback(folder.close)
             stack.callback(tracker.finish, failed=sys.exc_info()[0] is not None)
 

@@ -1,6 +1,11 @@
 """Measures the speed of generation, training, scoring and the store, as ratios inside one run.
 
-`python -m ngi.benchmark` prints a table and writes it as JSON. A ratio compares two things timed
-in turn within one process, so that a slow or busy machine slows both; every figure is a median
-with its quartiles.
+`python -m ngi.benchmark` prints tables and writes them as JSON. A ratio compares two things timed
+in turn, so that a slow or busy machine slows both; every figure is a median with its quartiles
+unless its name says otherwise.
 """
+
+PATCHES = 16
+"""Patches of a batch (paper, Sec. 4)."""
+PATCH_SIZE = 32
+"""Pixels along a patch's side."""

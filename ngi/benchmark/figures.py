@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
+import math
 import statistics
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import torch
 from tqdm import tqdm
 
+T = TypeVar("T")
+
+FEWEST = 3
+"""Repeats that are made however long they take."""
+
 
 @dataclass(frozen=True)
 class Figure:
-    """One measured number with its quartiles; `limit` is what it is meant to reach, if anything."""
+    """One measured number with its quartiles; `limit` is what it is meant to reach, if anything.
+
+    part: what part of the benchmark it belongs to. scene: what was rendered, if anything.
+    """
 
     name: str
     median: float
@@ -21,6 +31,8 @@ class Figure:
     upper: float
     unit: str
     limit: str = ""
+    part: str = ""
+    scene: str = ""
 
 
 def figure(name: str, values: Sequence[float], unit: str, limit: str = "") -> Figure:
@@ -28,30 +40,65 @@ def figure(name: str, values: Sequence[float], unit: str, limit: str = "") -> Fi
     return Figure(name, statistics.median(values), quartiles[0], quartiles[2], unit, limit)
 
 
-def in_turn(repeats: int, title: str, *functions: Callable[[], object]) -> list[list[float]]:
-    """Seconds of each function, called in turn `repeats` times after a warm-up of one."""
-    seconds: list[list[float]] = [[] for _ in functions]
-    for function in functions:
+def repeated(
+    repeats: int,
+    title: str,
+    function: Callable[[], T],
+    *,
+    seconds: float = math.inf,
+    fewest: int = FEWEST,
+    warm: bool = False,
+    timer: Callable[[], float] = time.perf_counter,
+) -> list[T]:
+    """What a function gives when it is called `repeats` times after a warm-up of one.
+
+    seconds: after so long no further call is begun, once there were `fewest`.
+    warm: there is nothing to warm up any more.
+    """
+    if not warm:
         function()
+    results: list[T] = []
+    end = timer() + seconds
     for _ in tqdm(range(repeats), desc=title, leave=False):
-        for function, times in zip(functions, seconds, strict=True):
-            start = time.perf_counter()
-            function()
-            if torch.cuda.is_available():
-                torch.cuda.synchronize()
-            times.append(time.perf_counter() - start)
-    return seconds
+        if len(results) >= fewest and timer() >= end:
+            break
+        results.append(function())
+    return results
+
+
+def alternated(
+    repeats: int,
+    title: str,
+    *timers: Callable[[], float],
+    seconds: float = math.inf,
+    warm: bool = False,
+) -> list[list[float]]:
+    """What each of several functions gives that time themselves, called in turn as `repeated`."""
+    rounds = repeated(
+        repeats, title, lambda: [timer() for timer in timers], seconds=seconds, warm=warm
+    )
+    return [list(values) for values in zip(*rounds, strict=True)]
+
+
+def in_turn(
+    repeats: int, title: str, *functions: Callable[[], object], seconds: float = math.inf
+) -> list[list[float]]:
+    """Seconds of each function, called in turn as `repeated`; a GPU is waited for."""
+    return alternated(repeats, title, *map(timed, functions), seconds=seconds)
+
+
+def timed(function: Callable[[], object]) -> Callable[[], float]:
+    """The function, giving its seconds."""
+
+    def call() -> float:
+        start = time.perf_counter()
+        function()
+        if torch.cuda.is_available():
+            torch.cuda.synchronize()
+        return time.perf_counter() - start
+
+    return call
 
 
 def ratio(numerator: Sequence[float], denominator: Sequence[float]) -> list[float]:
     return [a / b for a, b in zip(numerator, denominator, strict=True)]
-
-
-def table(figures: Sequence[Figure]) -> str:
-    width = max(len(f.name) for f in figures)
-    return "\n".join(
-        f"{f.name:<{width}}  {f.median:9.4g} {f.unit}"
-        + (f"  ({f.lower:.4g} – {f.upper:.4g})" if f.lower != f.upper else "")
-        + (f"  wanted {f.limit}" if f.limit else "")
-        for f in figures
-    )

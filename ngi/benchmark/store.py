@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import torch
 
+from ngi.benchmark import PATCHES
 from ngi.benchmark.figures import Figure, figure, in_turn
-from ngi.benchmark.training import PATCHES, random_patches
+from ngi.benchmark.training import random_patches
 from ngi.patches import BufferLayout
 from ngi.reuse import PatchStore
 

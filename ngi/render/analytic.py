@@ -111,6 +111,9 @@ class AnalyticRenderer:
         index = torch.arange(1.0, HARD_FRAMES + 1)[:, None]
         return torch.frac(index * torch.arange(1.0, self.dimensions + 1) * GOLDEN_RATIO)
 
+    def close(self) -> None:
+        """Nothing works elsewhere."""
+
     def _whole_image(self, v: Tensor, resolution: int) -> tuple[Tensor, Tensor]:
         require_positive(resolution=resolution)
         check_states(torch.cat([v, v.new_zeros(2)])[None], self.dimensions)

@@ -112,3 +112,7 @@ class Renderer(Protocol):
     def hard_frames(self) -> Tensor:
         """[10, D]: the scene's hard test frames (paper, Sec. 7.2.1)."""
         ...
+
+    def close(self) -> None:
+        """Ends whatever works for the renderer elsewhere; it is not used any more."""
+        ...

@@ -1,0 +1,172 @@
+"""Patches rendered by several processes, of this machine or of a cluster."""
+
+from __future__ import annotations
+
+import pickle
+import weakref
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
+from functools import cached_property, partial
+from typing import Any, Self
+
+import torch
+from torch import Tensor
+
+from ngi.render.protocol import RenderedPatches, Renderer
+from ngi.render.render_inputs import check_states, patch_window
+from ngi.render.worker_pool import WorkerPool
+from ngi.render.worker_process import WorkerProcess
+from ngi.render.worker_protocol import Request, Worker
+
+
+def mitsuba_renderer(*, workers: int, cluster: str | None, **options: Any) -> Renderer:
+    """The `MitsubaRenderer` with these options, or workers that have one each.
+
+    workers, cluster: see `WorkerRenderer`; 0 workers: everything is rendered in this process.
+    Raises ValueError for a cluster without workers, and what `MitsubaRenderer` and
+    `WorkerRenderer` raise.
+    """
+    from ngi.backend import VARIANTS, activate
+    from ngi.render.mitsuba_renderer import MitsubaRenderer
+
+    if workers == 0 and cluster is not None:
+        raise ValueError(f"renderer.cluster '{cluster}' needs workers; set renderer.workers")
+    if workers == 0:
+        return MitsubaRenderer(**options)
+    variant = activate(options.pop("backend"))  # 'auto' must not come out differently in a worker
+    backend = next(name for name in VARIANTS if VARIANTS[name] == variant)
+    return WorkerRenderer(
+        partial(MitsubaRenderer, backend=backend, **options), workers=workers, cluster=cluster
+    )
+
+
+class WorkerRenderer:
+    """The `ngi.render.Renderer` whose patches are rendered elsewhere; images are rendered here.
+
+    make: makes the renderer, here and in every worker; can be pickled, and not of `__main__`.
+    workers: how many, at least 1. A worker that dies is replaced, with a warning in the log, and
+        what it had not rendered is rendered again.
+    cluster: None for processes of this machine, otherwise the address of a Ray cluster, 'auto' for
+        the one that this machine belongs to.
+
+    A batch is cut into chunks, taken by whichever worker is free. Since a patch depends on its
+    state, the resolution and the seed alone, the numbers are those of the renderer itself, bit for
+    bit. Every worker holds the scene. They start when they are first needed, and end with `close`
+    or with this process, however it ends. Raises ValueError for a number of workers below 1, and
+    RuntimeError where Ray is missing or has no room for them.
+    """
+
+    def __init__(
+        self, make: Callable[[], Renderer], *, workers: int, cluster: str | None = None
+    ) -> None:
+        if workers < 1:
+            raise ValueError(
+                f"renderer.workers is {workers}; expected 1 or more, or 0 to render in this process"
+            )
+        self._local = make()
+        self.layout = self._local.layout
+        self.dimensions = self._local.dimensions
+        self.patch_size = self._local.patch_size
+        self.samples_per_pixel = self._local.samples_per_pixel
+        self.scene_hash = self._local.scene_hash
+        self._workers = workers
+        where = "" if cluster is None else f" on the Ray cluster '{cluster}'"
+        self.description = f"{self._local.description}, workers: {workers}{where}"
+        start = _starter(pickle.dumps(make), workers=workers, cluster=cluster)
+        self._pool = WorkerPool(start, workers)
+        self._close = weakref.finalize(self, self._pool.close)
+
+    def warm_up(self) -> None:
+        """See `ngi.render.Renderer.warm_up`; all workers at the same time."""
+        self._pool.warm_up()
+
+    def render_patches(self, states: Tensor, *, resolution: int, seed: int) -> RenderedPatches:
+        """See `ngi.render.Renderer.render_patches`."""
+        return self.start_patches(states, resolution=resolution, seed=seed).result()
+
+    def start_patches(self, states: Tensor, *, resolution: int, seed: int) -> ChunkedJob:
+        """See `ngi.render.Renderer.start_patches`; what is wrong with states is raised here."""
+        check_states(states, self.dimensions)
+        for state in states:
+            patch_window(state[-2:], patch_size=self.patch_size, resolution=resolution)
+        chunks = states.split(list(chunk_sizes(len(states), self._workers)))
+        # Copies: a pickled view would take the whole batch with it.
+        requests = [Request(chunk.clone(), resolution, seed) for chunk in chunks]
+        return ChunkedJob(self._pool.submit(requests))
+
+    def render_image(
+        self, scene_vector: Tensor, *, resolution: int, samples_per_pixel: int, seed: int
+    ) -> Tensor:
+        """See `ngi.render.Renderer.render_image`."""
+        return self._local.render_image(
+            scene_vector, resolution=resolution, samples_per_pixel=samples_per_pixel, seed=seed
+        )
+
+    def image_buffers(self, scene_vector: Tensor, *, resolution: int) -> Tensor:
+        """See `ngi.render.Renderer.image_buffers`."""
+        return self._local.image_buffers(scene_vector, resolution=resolution)
+
+    def hard_frames(self) -> Tensor:
+        """See `ngi.render.Renderer.hard_frames`."""
+        return self._local.hard_frames()
+
+    def close(self) -> None:
+        """See `ngi.render.Renderer.close`; a `with` block does it too."""
+        self._close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
+
+
+def _starter(make: bytes, *, workers: int, cluster: str | None) -> Callable[[int], Worker]:
+    if cluster is None:
+        return partial(WorkerProcess, of=workers, make=make)
+    try:
+        from ngi.render.ray_workers import RayWorker, join_cluster
+    except ModuleNotFoundError as error:
+        raise RuntimeError(
+            f"renderer.cluster '{cluster}' needs Ray; get it with `pip install -e .[ray]`"
+        ) from error
+    return partial(RayWorker, share=join_cluster(cluster, workers=workers), make=make)
+
+
+class ChunkedJob:
+    """The `PatchJob` of a batch that is rendered in chunks."""
+
+    def __init__(self, chunks: list[Future[RenderedPatches]]) -> None:
+        self._chunks = chunks
+
+    def done(self) -> bool:
+        """See `PatchJob.done`."""
+        return all(chunk.done() for chunk in self._chunks)
+
+    def result(self) -> RenderedPatches:
+        """See `PatchJob.result`."""
+        return self._joined
+
+    @cached_property
+    def _joined(self) -> RenderedPatches:
+        parts = [chunk.result() for chunk in self._chunks]
+        return RenderedPatches(
+            buffers=torch.cat([part.buffers for part in parts]),
+            log_radiance=torch.cat([part.log_radiance for part in parts]),
+            repaired=sum(part.repaired for part in parts),
+            masked=sum(part.masked for part in parts),
+            paths=sum(part.paths for part in parts),
+        )
+
+
+def chunk_sizes(patches: int, workers: int) -> Iterator[int]:
+    """Large chunks first, then smaller ones, so that all workers end at about the same time.
+
+    Patches differ in cost. (The same as OpenMP's guided schedule.) No patches are one chunk.
+    """
+    while True:
+        size = max(min(1, patches), patches // (2 * workers))
+        yield size
+        patches -= size
+        if patches == 0:
+            return
