@@ -93,11 +93,12 @@ class MitsubaRenderer:
         self.description = describe(self._variant)
 
     def warm_up(self) -> None:
-        """See `ngi.render.Renderer.warm_up`: two states, and of each size one launch."""
+        """See `ngi.render.Renderer.warm_up`: of each size one launch, with every material seen."""
         mi.set_variant(self._variant)
-        for value in (0.25, 0.75):
-            state = torch.full((self.dimensions + 2,), value)
-            sizes = sorted(set(self._passes))
+        sizes = sorted(set(self._passes))
+        count = max(2, self._scene.most_materials)
+        for value in (torch.arange(count) + 0.5) / count:
+            state = value.expand(self.dimensions + 2)
             for pending in self._launch_patch(state, 2 * self.patch_size, 0, sizes=sizes):
                 pending()
 

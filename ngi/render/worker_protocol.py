@@ -6,7 +6,7 @@ import pickle
 import sys
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import torch
@@ -76,11 +76,15 @@ class RenderServer:
         return _attempt(self._start)
 
     def render(self, request: Request) -> Reply:
-        """The patches that are asked for."""
-        return _attempt(
-            lambda: self._renderer.render_patches(
-                request.states, resolution=request.resolution, seed=request.seed
-            )
+        """The patches that are asked for, in this machine's memory."""
+        return _attempt(lambda: self._render(request))
+
+    def _render(self, request: Request) -> RenderedPatches:
+        patches = self._renderer.render_patches(
+            request.states, resolution=request.resolution, seed=request.seed
+        )
+        return replace(
+            patches, buffers=patches.buffers.cpu(), log_radiance=patches.log_radiance.cpu()
         )
 
     def _start(self) -> None:

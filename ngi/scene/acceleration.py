@@ -17,10 +17,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from ngi.backend import dr, mi
+from ngi.scene.jit_variables import address, variables_of
 
 _LIBRARY = "libembree3.so"
 _PREFIX = "_ZN7mitsuba"
@@ -110,7 +110,7 @@ class EmbreeScene:
             (_VERTICES, _FLOAT3, mesh.vertex_positions_buffer(), mesh.vertex_count()),
             (_INDICES, _UINT3, mesh.faces_buffer(), mesh.face_count()),
         ):
-            self._call["set_buffer"](geometry, kind, 0, form, _address(array), 0, 12, count)
+            self._call["set_buffer"](geometry, kind, 0, form, address(array), 0, 12, count)
 
 
 def _handle(scene: mi.Scene, library: ctypes.CDLL) -> int | None:
@@ -119,17 +119,9 @@ def _handle(scene: mi.Scene, library: ctypes.CDLL) -> int | None:
     The variables that Dr.Jit finds in a scene begin with two that stand for addresses: that of
     Embree's scene, and that of the function that intersects it, by which they are recognised.
     """
-    indices: list[int] = []
-    with dr.scoped_set_flag(dr.JitFlag.EnableObjectTraversal, True):
-        scene._traverse_1_cb_ro(lambda index, *_: indices.append(index))
-    if len(indices) < 2:
+    variables = variables_of(scene)
+    if len(variables) < 2:
         return None
-    handle, function = (
-        _address(dr.detail.update_indices(mi.UInt64(0), [index])) for index in indices[:2]
-    )
+    handle, function = map(address, variables[:2])
     known = [ctypes.cast(library[_PREFIX + name], ctypes.c_void_p).value for name in _INTERSECT]
     return handle if function in known else None
-
-
-def _address(array: dr.ArrayBase) -> int:
-    return int(torch.from_dlpack(array).data_ptr())

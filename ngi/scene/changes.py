@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from ngi.backend import dr, mi
 from ngi.scene.acceleration import EmbreeScene
+from ngi.scene.jit_variables import evaluate
 
 GEOMETRY = frozenset({"to_world", "vertex_positions", "vertex_normals"})
 """Parameters of a shape that say where it is."""
@@ -35,14 +36,22 @@ class Changes:
             for (_, node), names in written.items()
             if isinstance(node, mi.Shape) and not GEOMETRY.isdisjoint(names)
         ]
+        bitmaps = [node for _, node in written if node.class_name().startswith("BitmapTexture")]
         if self._structure is None or any(shape not in self._structure for shape in moved):
             self._parameters.update()
-            return
+        else:
+            self._tell_all_but_the_scene()
+            if moved:
+                self._structure.move({shape: self._to_world.get(shape) for shape in moved})
+        if not mi.variant().startswith("scalar"):
+            evaluate(bitmaps)
+
+    def _tell_all_but_the_scene(self) -> None:
+        """The scene itself would build the acceleration structure."""
+        written = self._parameters.nodes_to_update
         for (_, node), names in sorted(written.items(), key=lambda entry: -entry[0][0]):
             if node != self._scene:
                 node.parameters_changed(list(names))
         written.clear()
         self._parameters.update_candidates.clear()
         dr.eval()
-        if moved:
-            self._structure.move({shape: self._to_world.get(shape) for shape in moved})

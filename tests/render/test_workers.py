@@ -197,7 +197,7 @@ def test_gpus_are_those_that_cuda_may_see(monkeypatch) -> None:
 
 def test_training_goes_first_and_ctrl_c_is_its_own(two) -> None:
     two.warm_up()
-    wait_for(lambda: {os.getpriority(os.PRIO_PROCESS, pid) for pid in processes()} == {19})
+    wait_for(lambda: {os.getpriority(os.PRIO_PROCESS, pid) for pid in processes()} == {10})
     assert os.getpgrp() not in {os.getpgid(pid) for pid in processes()}
 
 
