@@ -15,6 +15,10 @@ from ngi.render import Renderer
 from ngi.render.mitsuba_renderer import MitsubaRenderer
 from ngi.render.workers import WorkerRenderer
 from ngi.scene import SceneDescription
+from ngi.scene.kinds import Material
+
+SETTLING = 48
+"""Patches after which the combinations of varying materials have come up."""
 
 
 class Batches:
@@ -33,9 +37,11 @@ class Batches:
         needed_only: bool = True,
         workers: int = 0,
     ) -> None:
+        scene = read()
+        self._materials_vary = any(isinstance(v, Material) for v in scene.variables)
         make = partial(
             MitsubaRenderer,
-            scene=read(),
+            scene=scene,
             patch_size=PATCH_SIZE,
             samples_per_pixel=samples_per_pixel,
             needed_only=needed_only,
@@ -46,6 +52,14 @@ class Batches:
 
     def warm_up(self) -> None:
         self.renderer.warm_up()
+
+    def settle(self) -> None:
+        """Where materials vary, has every combination of them recorded.
+
+        That takes a second each, once in a process, and compiles nothing.
+        """
+        if self._materials_vary:
+            self.render(SETTLING, patches=1)
 
     def render(self, batches: int = 1, *, patches: int = PATCHES) -> float:
         """Renders the next batches, all started before the first is waited for; their seconds."""

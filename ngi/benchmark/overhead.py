@@ -32,6 +32,7 @@ def overhead(
     make = partial(Batches, scene.read, samples_per_pixel=samples_per_pixel)
     with remote(make) as batches:
         batches(Batches.warm_up)
+        batches(Batches.settle)
         samples = batches(_samples_per_pixel)
         patches = patches_of_batch(samples)
         paths = patches * PATCH_SIZE**2 * samples
