@@ -15,7 +15,7 @@ from ngi.render import Renderer
 from ngi.render.mitsuba_renderer import MitsubaRenderer
 from ngi.render.workers import WorkerRenderer
 from ngi.scene import SceneDescription
-from ngi.scene.kinds import Material
+from ngi.scene.kinds import most_materials
 
 SETTLING = 48
 """Patches after which the combinations of varying materials have come up."""
@@ -38,7 +38,7 @@ class Batches:
         workers: int = 0,
     ) -> None:
         scene = read()
-        self._materials_vary = any(isinstance(v, Material) for v in scene.variables)
+        self._materials_vary = most_materials(scene.variables) > 0
         make = partial(
             MitsubaRenderer,
             scene=scene,

@@ -26,8 +26,8 @@ def compilations(scene: Scene, *, samples_per_pixel: int | None, patches: int) -
     """Seconds of the warm-up with an empty cache and in the next process; kernels after it.
 
     A kernel counts as compiled where it was not in the process's memory, see `counted_kernels`.
-    Recordings are those of
-    Dr.Jit's frozen functions; a material that varies takes several, which compile nothing new.
+    Recordings are those of Dr.Jit's frozen functions; a material that varies takes several, which
+    compile nothing new.
     """
     make = partial(Batches, scene.read, samples_per_pixel=samples_per_pixel)
     with TemporaryDirectory() as folder:

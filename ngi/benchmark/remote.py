@@ -1,7 +1,8 @@
 """Objects in processes of their own, which are asked in turn and idle in between.
 
-Dr.Jit can record the launches of one scene per process, so that whatever is compared with patches
-traces elsewhere; and what a fresh process compiles or keeps in memory needs a fresh process.
+Dr.Jit cannot always record launches where another scene was loaded meanwhile, so that whatever is
+compared with patches traces elsewhere; and what a fresh process compiles or keeps in memory needs a
+fresh process.
 """
 
 from __future__ import annotations

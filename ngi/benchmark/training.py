@@ -107,21 +107,6 @@ def training(features: int, layers: int, bf16: bool, repeats: int) -> list[Figur
     ]  # fmt: skip
 
 
-def scoring_seconds(
-    target: Target, repeats: int, *, features: int = 512, layers: int = 8, bf16: bool = True
-) -> list[float]:
-    """What scoring 16 proposals and 16 current states adds to a training step, in seconds.
-
-    Each is the difference between two steps timed in turn, one with scoring and one without; a
-    GPU is waited for.
-    """
-    ours = Training(features, layers, bf16=bf16)
-    steps, scored = in_turn(
-        repeats, f"scoring, {layers}x{features}", ours.step, ours.step_with(target)
-    )
-    return [a - b for a, b in zip(scored, steps, strict=True)]
-
-
 def training_operations(network: PixelGenerator) -> int:
     """Floating-point operations in the matrix products of a step on 16 patches.
 

@@ -118,7 +118,7 @@ STEPS = (
     "copying",
 )
 """Steps of rendering a patch: writing the scene's parameters; moving shapes in the acceleration
-structure; Python's part of the launches, and the rest of the kernels; results becoming NumPy's."""
+structure; Python's part of the launches, and the rest of the kernels; results copied."""
 
 
 @contextmanager

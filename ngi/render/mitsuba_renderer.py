@@ -16,6 +16,7 @@ from ngi.render.render_inputs import check_states, patch_window, require_positiv
 from ngi.render.scalar_tracer import ScalarTracer
 from ngi.render.tracing import Pending, Tracer, derive_seed
 from ngi.scene import SceneDescription
+from ngi.scene.kinds import most_materials
 from ngi.scene.variable_scene import VariableScene
 
 BUFFER_SAMPLES = {"cuda_ad_rgb": 16, "llvm_ad_rgb": 16, "scalar_rgb": 2}
@@ -96,7 +97,7 @@ class MitsubaRenderer:
         """See `ngi.render.Renderer.warm_up`: of each size one launch, with every material seen."""
         mi.set_variant(self._variant)
         sizes = sorted(set(self._passes))
-        count = max(2, self._scene.most_materials)
+        count = max(2, most_materials(self._scene.description.variables))
         for value in (torch.arange(count) + 0.5) / count:
             state = value.expand(self.dimensions + 2)
             for pending in self._launch_patch(state, 2 * self.patch_size, 0, sizes=sizes):

@@ -53,12 +53,6 @@ class VariableScene:
             affected.add("camera")
         return frozenset(affected)
 
-    @property
-    def most_materials(self) -> int:
-        """Of how many BSDFs a variable chooses at most, 0 where none does."""
-        materials = (v for v in self.description.variables if isinstance(v, Material))
-        return max((len(material.choices) for material in materials), default=0)
-
     def bsdfs(self) -> list[mi.BSDF]:
         """Every BSDF that a ray can hit at some v."""
         shapes = [shape for shape in self.shapes if has_surface(shape)]

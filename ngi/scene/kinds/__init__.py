@@ -10,6 +10,7 @@ from ngi.scene.kinds.appearance import (
     Roughness,
     Texels,
     Texture,
+    most_materials,
 )
 from ngi.scene.kinds.placement import KeyFrames, Rotation, Scale, Shape, Translation, Visibility
 from ngi.scene.kinds.view import CameraPath, Direction, LookAt
@@ -33,6 +34,7 @@ __all__ = [
     "Texture",
     "Translation",
     "Visibility",
+    "most_materials",
 ]
 
 KINDS: dict[str, type[Variable]] = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from math import inf
@@ -187,6 +188,11 @@ class Material(DiscreteVariable):
 
     def bind(self, scene: LoadedScene) -> Write:
         return in_turn([scene.materials(object_id, self.choices) for object_id in self.objects])
+
+
+def most_materials(variables: Iterable[Variable]) -> int:
+    """Of how many BSDFs one of the variables chooses at most, 0 where none does."""
+    return max((len(v.choices) for v in variables if isinstance(v, Material)), default=0)
 
 
 def _bitmap(scene: LoadedScene, object_id: str) -> str:

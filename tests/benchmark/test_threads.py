@@ -2,8 +2,7 @@ from contextlib import nullcontext
 
 import pytest
 
-from ngi.benchmark import threads, training
-from ngi.explore import LossTimesStep
+from ngi.benchmark import threads
 
 
 def test_both_in_turn_are_compared_with_the_sum_of_each_alone(
@@ -35,15 +34,3 @@ def test_each_is_timed_alone_and_then_both_in_turn(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(threads, "Training", Recorded)
     assert len(threads.Turns(16, 3, bf16=False).seconds()) == 3
     assert "".join(calls) == "rr" + "ss" + "rsrs"
-
-
-def test_scoring_is_what_a_step_takes_longer_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    def in_turn(repeats: int, _title: str, plain, scored) -> list[list[float]]:
-        assert repeats == 2
-        plain()
-        scored()
-        return [[1.0, 2.0], [1.5, 2.25]]
-
-    monkeypatch.setattr(training, "in_turn", in_turn)
-    target = LossTimesStep()
-    assert training.scoring_seconds(target, 2, features=16, layers=3) == [0.5, 0.25]
