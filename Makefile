@@ -3,7 +3,10 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-.PHONY: help setup demo test lint smoke benchmark doctor clean
+SWEEPS := same_time preconditioning resolution target_function acceptance histogram dimensions specular chess
+BUDGET ?= small
+OPTIONS ?=
+.PHONY: help setup demo test report lint smoke benchmark doctor clean
 
 help: ## list the commands
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 14
@@ -30,6 +33,13 @@ smoke: setup
 	@rm -rf outputs/smoke
 	@$(BIN)/python -m ngi.train -m +sweeps=smoke
 	@$(BIN)/python -m analysis.report outputs/smoke
+
+report: setup ## all sweeps at BUDGET=smoke|small|paper: runs what is missing, builds the report
+	@failed=0; for sweep in $(SWEEPS); do \
+	$(BIN)/python -m ngi.costs -m +sweeps=$$sweep budget=$(BUDGET) $(OPTIONS) && \
+	$(BIN)/python -m ngi.train -m +sweeps=$$sweep budget=$(BUDGET) budget.clock=model $(OPTIONS) \
+	|| failed=1; done; \
+	$(BIN)/python -m analysis.report outputs/$(BUDGET)-model-clock && exit $$failed
 
 benchmark: setup ## speed as ratios, with the machine's own limits measured beside: 15 minutes
 	@$(BIN)/python -m ngi.benchmark

@@ -17,3 +17,12 @@ def run_name(overrides: str | None) -> str:
     if len(name) <= LONGEST:
         return name
     return f"{name[:LONGEST]}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"
+
+
+def run_group(experiment: str | None, budget: str, clock: str) -> str:
+    """The folder of runs that belong together: the experiment, or else the budget.
+
+    Times of two clocks are not compared: counted ones ('model') have a folder of their own.
+    """
+    group = experiment or budget
+    return group if clock == "wall" else f"{group}-{clock}-clock"

@@ -16,14 +16,16 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
 
 import ngi
+from ngi.build import build_module, build_stream, plain, run_costs
+from ngi.energy import EnergyMeter, energy_counters
 from ngi.memory import keep_freed_memory
 from ngi.precision import fast_precision
 from ngi.resources import cache_folder, root
-from ngi.run_name import run_name
+from ngi.run_name import run_group, run_name
 from ngi.scene import scenes
 
 if TYPE_CHECKING:
-    from ngi.learn import Budget, RunFolder, Tracker
+    from ngi.learn import Budget, Costs, RunFolder, Tracker
     from ngi.render import Renderer
 
 log = logging.getLogger(__name__)
@@ -32,6 +34,7 @@ NOT_IDENTITY = (
     "run",
     "tracker",
     "label",
+    "budget.costs",
     "renderer.scene",
     "renderer.workers",
     "renderer.cluster",
@@ -52,7 +55,8 @@ def train(config: DictConfig) -> dict[str, Any]:
     keep_freed_memory()
     budget = instantiate(config.budget)
     renderer = instantiate(config.renderer)
-    settings = _settings(config, scene_hash=renderer.scene_hash)
+    costs = run_costs(config, budget=budget, renderer=renderer)
+    settings = _settings(config, scene_hash=renderer.scene_hash, costs=costs)
     folder = learn.RunFolder(Path(config.run.folder), settings=settings)
     tracker = instantiate(config.tracker)
     try:
@@ -73,35 +77,29 @@ def _train(
     from ngi import learn
     from ngi.patches import Patches
 
-    clock = learn.PhaseClock()
-    stream = learn.TrainingStream(
-        renderer=renderer,
-        sampler=instantiate(config.sampler),
-        store=instantiate(config.reuse.store)(layout=renderer.layout),
-        archive=learn.PatchArchive(folder.patches),
-        policy=instantiate(config.reuse.policy),
-        schedule=instantiate(config.resolution),
-        clock=clock,
-        seed=config.seed,
-        when_late=config.reuse.when_late,
-    )
-    module = learn.IlluminationModule(
-        network=learn.seeded(instantiate(config.model), seed=config.seed)(
-            layout=renderer.layout, scene_dimensions=renderer.dimensions
-        ),
-        loss=instantiate(config.loss),
-        optimizer=instantiate(config.optimizer),
-        target=stream.sampler.target,
-        clock=clock,
+    clock = learn.PhaseClock(energy=EnergyMeter(energy_counters()))
+    stream = build_stream(config, renderer=renderer, clock=clock, patches=folder.patches)
+    module = build_module(config, renderer=renderer, target=stream.sampler.target, clock=clock)
+    costs = folder.settings["costs"]
+    run_clock = (
+        clock if costs is None else learn.ModelClock(costs=costs, counters=lambda: stream.counters)
     )
     recorder = learn.Recorder(
         evaluator=instantiate(config.evaluation.evaluator)(renderer=renderer),
+        target_map=None
+        if config.evaluation.target_map is None
+        else instantiate(config.evaluation.target_map)(
+            renderer=renderer,
+            resolution=instantiate(config.resolution).resolution(0),
+            signals=module.signals,
+        ),
         predict=module.predict,
         folder=folder,
         stream=stream,
         clock=clock,
+        run_clock=run_clock,
         tracker=tracker,
-        label={**_plain(config.label), "seed": config.seed},
+        label={**plain(config.label), "seed": config.seed},
         backend=renderer.description,
     )
     trainer = instantiate(config.trainer)(
@@ -110,6 +108,7 @@ def _train(
         callbacks=learn.callbacks(
             stream=stream,
             clock=clock,
+            run_clock=run_clock,
             folder=folder,
             tracker=tracker,
             budget=budget,
@@ -135,18 +134,14 @@ def _train(
     renderer.warm_up()
     trainer.fit(module, datamodule, ckpt_path=checkpoint, weights_only=True)
     module.to(trainer.strategy.root_device)  # Lightning has taken it back to the CPU
+    for optimizer in trainer.optimizers:
+        optimizer.load_state_dict(optimizer.state_dict())  # moves its state to the weights
     return recorder.finish()
 
 
-def _plain(config: DictConfig) -> dict[str, Any]:
-    plain = OmegaConf.to_container(config, resolve=True, throw_on_missing=True)
-    assert isinstance(plain, dict)
-    return {str(key): value for key, value in plain.items()}
-
-
-def _settings(config: DictConfig, *, scene_hash: str) -> dict[str, Any]:
-    """What decides the result. The scene counts by its content, not by where it lies."""
-    settings = _plain(config)
+def _settings(config: DictConfig, *, scene_hash: str, costs: Costs | None) -> dict[str, Any]:
+    """What decides the result. Scene and costs count by content, not by where they lie."""
+    settings = plain(config)
     for key in NOT_IDENTITY:
         *path, last = key.split(".")
         parent = settings
@@ -154,6 +149,7 @@ def _settings(config: DictConfig, *, scene_hash: str) -> dict[str, Any]:
             parent = parent[part]
         parent.pop(last, None)
     settings["scene"] = {"name": config.scene.name, "hash": scene_hash}
+    settings["costs"] = costs
     settings["version"] = ngi.__version__
     return settings
 
@@ -166,6 +162,7 @@ def register() -> None:
         reader = {"_target_": "ngi.scene.read_scene", **arguments}
         store.store(group="scene", name=name, node={"name": name, "reader": reader})
     OmegaConf.register_new_resolver("run_name", run_name, replace=True)
+    OmegaConf.register_new_resolver("run_group", run_group, replace=True)
     OmegaConf.register_new_resolver("fast_precision", fast_precision, replace=True)
     OmegaConf.register_new_resolver("folder_name", lambda path: Path(path).name, replace=True)
     OmegaConf.register_new_resolver("cache_folder", lambda: str(cache_folder()), replace=True)

@@ -71,19 +71,93 @@ def test_the_defaults_are_the_papers() -> None:
     ]
 
 
-def test_methods_pair_sampler_and_resolution_as_the_paper_does() -> None:
-    choices = composed("method=uniform").hydra.runtime.choices
-    assert (choices.sampler, choices.resolution) == ("uniform", "constant")
-    choices = composed("method=active_exploration").hydra.runtime.choices
-    assert (choices.sampler, choices.resolution) == ("mcmc_loss_step", "growing")
+PRECONDITIONED, PLAIN = "pixel_generator", "pixel_generator_no_preconditioning"
+METHODS = {  # sampler, resolution, model, specular
+    "active_exploration": ("mcmc_loss_step", "growing", PRECONDITIONED, "learned"),
+    "uniform": ("uniform", "constant", PRECONDITIONED, "learned"),
+    "uniform_growing": ("uniform", "growing", PRECONDITIONED, "learned"),
+    "constant_resolution": ("mcmc_loss_step", "constant", PRECONDITIONED, "learned"),
+    "loss_target": ("mcmc_loss", "growing", PRECONDITIONED, "learned"),
+    "output_gradient_target": ("mcmc_output_gradient", "growing", PRECONDITIONED, "learned"),
+    "metropolis": ("mcmc_metropolis", "growing", PRECONDITIONED, "learned"),
+    "no_preconditioning": ("mcmc_loss_step", "growing", PLAIN, "learned"),
+    "traced_specular": ("mcmc_loss_step", "growing", PRECONDITIONED, "traced"),
+}
 
 
-@pytest.mark.parametrize("sweep", [f.stem for f in sorted((root() / "sweeps").glob("*.yaml"))])
-def test_every_sweep_says_its_command_and_composes(sweep: str) -> None:
+def test_every_method_is_listed_here() -> None:
+    assert set(METHODS) == {file.stem for file in (CONF / "method").glob("*.yaml")}
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_method_differs_where_its_name_says_and_nowhere_else(method: str) -> None:
+    config = composed(f"method={method}", "budget=small")
+    chosen = config.hydra.runtime.choices
+    found = (chosen.sampler, chosen.resolution, chosen.model, config.renderer.specular)
+    assert found == METHODS[method]
+    assert config.label.method == method
+    other = composed("budget=small")
+    for part in ("scene", "reuse", "loss", "optimizer", "budget", "evaluation", "trainer"):
+        assert config[part] == other[part], part
+
+
+BUDGETS = ("smoke", "small", "paper")
+SWEEPS = [file.stem for file in sorted((root() / "sweeps").glob("*.yaml"))]
+OF_ONE_SIZE = ("demo", "needed", "smoke")
+"""Sweeps that are no table or figure of the paper."""
+
+
+@pytest.mark.parametrize("sweep", SWEEPS)
+def test_every_sweep_says_its_command(sweep: str) -> None:
     text = (root() / "sweeps" / f"{sweep}.yaml").read_text()
     assert f"python -m ngi.train -m +sweeps={sweep}" in text.splitlines()[1]
-    config = composed(f"+sweeps={sweep}")
-    assert config.hydra.sweeper.params
+    assert composed(f"+sweeps={sweep}").hydra.sweeper.params
+
+
+@pytest.mark.parametrize("budget", BUDGETS)
+@pytest.mark.parametrize("sweep", [sweep for sweep in SWEEPS if sweep not in OF_ONE_SIZE])
+def test_every_sweep_of_the_paper_is_there_at_every_budget(sweep: str, budget: str) -> None:
+    params = composed(f"+sweeps={sweep}", f"budget={budget}").hydra.sweeper.params
+    assert next(iter(params)) == "seed", "seeds have to vary slowest"
+    seeds, scenes, methods = (params[key].split(",") for key in ("seed", "scene", "method"))
+    assert len(seeds) >= 3
+    assert len(methods) >= 2
+    for scene in scenes:
+        config = composed(f"+sweeps={sweep}", f"budget={budget}", f"scene={scene}")
+        assert config.scene.name == scene
+    for method in methods:
+        config = composed(f"+sweeps={sweep}", f"budget={budget}", f"method={method}")
+        assert config.label.budget == budget
+        assert config.label.method == method
+
+
+def test_runs_that_two_sweeps_need_are_one_run() -> None:
+    arguments = ("budget=small", "scene=living-room", "method=active_exploration", "seed=1")
+    one = composed("+sweeps=same_time", *arguments)
+    for sweep in ("preconditioning", "resolution", "target_function", "acceptance"):
+        other = composed(f"+sweeps={sweep}", *arguments)
+        assert {key: one[key] for key in one if key not in ("hydra", "run")} == {
+            key: other[key] for key in other if key not in ("hydra", "run")
+        }
+
+
+@pytest.mark.parametrize(
+    ("arguments", "folder"),
+    [
+        ("budget=small method=uniform", "outputs/small/sphere-caustic/method=uniform/seed=0"),
+        (
+            "budget=small budget.clock=model",
+            "outputs/small-model-clock/sphere-caustic/default/seed=0",
+        ),
+        ("experiment=demo seed=2", "outputs/demo/sphere-caustic/default/seed=2"),
+        ("scene=mirror budget=seconds", "outputs/seconds/mirror/default/seed=0"),
+    ],
+)
+def test_a_folder_is_named_after_budget_scene_and_what_was_changed(
+    arguments: str, folder: str
+) -> None:
+    config = composed(*arguments.split())
+    assert config.hydra.run.dir == folder
 
 
 def test_every_experiment_says_its_command() -> None:

@@ -1,6 +1,6 @@
 import pytest
 
-from ngi.run_name import LONGEST, run_name
+from ngi.run_name import LONGEST, run_group, run_name
 
 
 @pytest.mark.parametrize(
@@ -21,3 +21,9 @@ def test_long_names_are_cut_but_stay_apart() -> None:
     a, b = run_name("x" * 300 + "=1"), run_name("x" * 300 + "=2")
     assert a != b
     assert len(a) < LONGEST + 12
+
+
+def test_runs_are_grouped_by_experiment_or_budget_and_by_clock() -> None:
+    assert run_group("demo", "small", "wall") == "demo"
+    assert run_group(None, "small", "wall") == "small"
+    assert run_group(None, "small", "model") == "small-model-clock"

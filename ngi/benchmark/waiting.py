@@ -54,8 +54,8 @@ def result_of_run(scene: Sequence[str], *, workers: int) -> dict[str, Any]:
     """The result of a short run in a fresh process, which says what its seconds went to."""
     with TemporaryDirectory() as folder:
         command = [
-            *(sys.executable, "-m", "ngi.train", "experiment=small", "evaluation=smoke"),
-            *("budget=steps", f"budget.steps={STEPS}", "evaluation.count=1"),
+            *(sys.executable, "-m", "ngi.train", "budget=small", "evaluation=smoke"),
+            *(f"budget.steps={STEPS}", "budget.seconds=null", "evaluation.count=1"),
             "reuse.policy.bootstrap_batches=2",
             *(f"renderer.workers={workers}", f"hydra.run.dir={folder}", *scene),
         ]

@@ -34,7 +34,9 @@ class Growing:
     """
 
     def __init__(self, *, start: int, step: int, every: int, end: int) -> None:
-        _check_positive(start=start, step=step, every=every, end=end)
+        _check_positive(start=start, every=every, end=end)
+        if step < 0:
+            raise ValueError(f"step: {step}: give at least 0; with 0 the resolution stays")
         if end < start:
             raise ValueError(f"end: {end}: give at least start, which is {start}")
         self._start = start

@@ -1,17 +1,21 @@
 """Where exploration, rendering, reuse and the network meet."""
 
 from ngi.learn.batch import Batch, Feedback
-from ngi.learn.budget import Budget, Seconds, Steps
-from ngi.learn.callbacks import callbacks
+from ngi.learn.budget import Budget
+from ngi.learn.callbacks import SamplerFeedback, callbacks
 from ngi.learn.checkpoint import AtomicCheckpointIO, prepare_resume
-from ngi.learn.clock import PhaseClock
+from ngi.learn.clock import PhaseClock, RunClock
+from ngi.learn.costs import Component, CostFile, Costs, components
 from ngi.learn.datamodule import ExplorationDataModule
+from ngi.learn.model_clock import ModelClock
 from ngi.learn.module import IlluminationModule, seeded
+from ngi.learn.record_log import RecordLog
 from ngi.learn.recorder import Recorder
 from ngi.learn.row_log import RowLog
 from ngi.learn.run_folder import RunFolder
 from ngi.learn.scorer import Scorer
 from ngi.learn.stream import TrainingStream
+from ngi.learn.target_map import TargetMap
 from ngi.learn.tracker import Local, Tracker, WeightsAndBiases
 from ngi.reuse import PatchArchive
 
@@ -19,22 +23,29 @@ __all__ = [
     "AtomicCheckpointIO",
     "Batch",
     "Budget",
+    "Component",
+    "CostFile",
+    "Costs",
     "ExplorationDataModule",
     "Feedback",
     "IlluminationModule",
     "Local",
+    "ModelClock",
     "PatchArchive",
     "PhaseClock",
+    "RecordLog",
     "Recorder",
     "RowLog",
+    "RunClock",
     "RunFolder",
+    "SamplerFeedback",
     "Scorer",
-    "Seconds",
-    "Steps",
+    "TargetMap",
     "Tracker",
     "TrainingStream",
     "WeightsAndBiases",
     "callbacks",
+    "components",
     "prepare_resume",
     "seeded",
 ]

@@ -52,12 +52,14 @@ class Feedback:
 class Counters:
     """Running totals of a run; all are logged and checkpointed.
 
+    scored_batches: generated batches for which the chains' current states were scored too
     batches_postponed: how often stored patches were trained on because new ones were not rendered
         yet (`TrainingStream`'s `when_late`)
     """
 
     iteration: int = 0
     generated_batches: int = 0
+    scored_batches: int = 0
     batches_postponed: int = 0
     patches_traced: int = 0
     paths_traced: int = 0

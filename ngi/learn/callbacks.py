@@ -14,7 +14,7 @@ from typing import Any
 from tqdm import tqdm
 
 from ngi.learn.budget import Budget
-from ngi.learn.clock import PhaseClock
+from ngi.learn.clock import PhaseClock, RunClock
 from ngi.learn.lightning_api import Callback, LightningModule, Trainer
 from ngi.learn.recorder import Recorder
 from ngi.learn.run_folder import RunFolder
@@ -24,7 +24,7 @@ from ngi.learn.tracker import Tracker
 log = logging.getLogger(__name__)
 
 
-def budget_used(budget: Budget, stream: TrainingStream, clock: PhaseClock) -> float:
+def budget_used(budget: Budget, stream: TrainingStream, clock: RunClock) -> float:
     """The part of the budget that is used up by now."""
     return budget.fraction(steps=stream.counters.iteration, run_seconds=clock.run_seconds)
 
@@ -33,10 +33,17 @@ class SamplerFeedback(Callback):
     """Times the training phase, hands each step's feedback to the stream and logs the step."""
 
     def __init__(
-        self, *, stream: TrainingStream, clock: PhaseClock, folder: RunFolder, tracker: Tracker
+        self,
+        *,
+        stream: TrainingStream,
+        clock: PhaseClock,
+        run_clock: RunClock,
+        folder: RunFolder,
+        tracker: Tracker,
     ) -> None:
         self._stream = stream
         self._clock = clock
+        self._run_clock = run_clock
         self._folder = folder
         self._tracker = tracker
         self._training: AbstractContextManager[None] | None = None
@@ -57,11 +64,14 @@ class SamplerFeedback(Callback):
         self._stream.feedback(outputs["feedback"])
         row = {
             "step": self._stream.counters.iteration,
-            "run_seconds": round(self._clock.run_seconds, 4),
+            "run_seconds": round(self._run_clock.run_seconds, 4),
             "loss": loss,
             **self._stream.log_row(),
         }
         self._folder.steps.append(row)
+        if self._stream.chain_record is not None:
+            step = self._stream.counters.iteration
+            self._folder.chains.append({"step": step, **self._stream.chain_record})
         self._tracker.log(row)
 
     def on_train_end(self, *_: Any) -> None:
@@ -84,7 +94,7 @@ class PeriodicEvaluation(Callback):
         count: int,
         budget: Budget,
         stream: TrainingStream,
-        clock: PhaseClock,
+        run_clock: RunClock,
     ) -> None:
         if count < 1:
             raise ValueError(f"evaluation.count: {count}; expected at least 1 evaluation")
@@ -92,11 +102,11 @@ class PeriodicEvaluation(Callback):
         self._count = count
         self._budget = budget
         self._stream = stream
-        self._clock = clock
+        self._run_clock = run_clock
         self._done = 0
 
     def on_train_batch_end(self, *_: Any) -> None:
-        used = budget_used(self._budget, self._stream, self._clock)
+        used = budget_used(self._budget, self._stream, self._run_clock)
         due = int(used * self._count)
         if used < 1 and due > self._done:
             self._stream.finish_rendering()
@@ -113,7 +123,7 @@ class PeriodicEvaluation(Callback):
 class BudgetAndCheckpoint(Callback):
     """Shows progress, saves a checkpoint every so often, and ends the run when the budget is spent.
 
-    every_seconds: run time between checkpoints
+    every_seconds: run time between checkpoints, by the wall clock
     every_steps: further checkpoints after so many steps; None for none
     """
 
@@ -123,6 +133,7 @@ class BudgetAndCheckpoint(Callback):
         budget: Budget,
         stream: TrainingStream,
         clock: PhaseClock,
+        run_clock: RunClock,
         folder: RunFolder,
         every_seconds: float,
         every_steps: int | None,
@@ -130,6 +141,7 @@ class BudgetAndCheckpoint(Callback):
         self._budget = budget
         self._stream = stream
         self._clock = clock
+        self._run_clock = run_clock
         self._folder = folder
         self._every_seconds = every_seconds
         self._every_steps = every_steps
@@ -138,7 +150,7 @@ class BudgetAndCheckpoint(Callback):
         self._bar: tqdm[Any] | None = None
 
     def on_train_start(self, trainer: Trainer, *_: Any) -> None:
-        used = budget_used(self._budget, self._stream, self._clock)
+        used = budget_used(self._budget, self._stream, self._run_clock)
         trainer.should_stop = used >= 1  # killed after its last step, before its result
         self._saved_at = self._clock.run_seconds
         self._saved_step = self._stream.counters.iteration
@@ -154,7 +166,7 @@ class BudgetAndCheckpoint(Callback):
         self, trainer: Trainer, _module: LightningModule, outputs: Any, *_: Any
     ) -> None:
         steps, seconds = self._stream.counters.iteration, self._clock.run_seconds
-        used = budget_used(self._budget, self._stream, self._clock)
+        used = budget_used(self._budget, self._stream, self._run_clock)
         self._show(min(used, 1.0), float(outputs["loss"]))
         periodic = self._every_steps is not None and steps % self._every_steps == 0
         if used >= 1 or periodic or seconds - self._saved_at >= self._every_seconds:
@@ -182,8 +194,8 @@ class BudgetAndCheckpoint(Callback):
             )
 
     def _save(self, trainer: Trainer) -> None:
-        self._folder.steps.flush()
-        self._folder.metrics.flush()
+        for log_file in self._folder.logs:
+            log_file.flush()
         trainer.save_checkpoint(self._folder.checkpoint)
         self._stream.prune_archive()
 
@@ -206,6 +218,7 @@ def callbacks(
     *,
     stream: TrainingStream,
     clock: PhaseClock,
+    run_clock: RunClock,
     folder: RunFolder,
     tracker: Tracker,
     budget: Budget,
@@ -214,16 +227,22 @@ def callbacks(
     checkpoint_seconds: float,
     checkpoint_steps: int | None,
 ) -> list[Callback]:
-    """All callbacks of a run, in the order that they depend on."""
+    """All callbacks of a run, in the order that they depend on.
+
+    clock: the wall clock; run_clock: the one by which the budget ends, which may be the same
+    """
     return [
-        SamplerFeedback(stream=stream, clock=clock, folder=folder, tracker=tracker),
+        SamplerFeedback(
+            stream=stream, clock=clock, run_clock=run_clock, folder=folder, tracker=tracker
+        ),
         PeriodicEvaluation(
-            recorder=recorder, count=evaluations, budget=budget, stream=stream, clock=clock
+            recorder=recorder, count=evaluations, budget=budget, stream=stream, run_clock=run_clock
         ),
         BudgetAndCheckpoint(
             budget=budget,
             stream=stream,
             clock=clock,
+            run_clock=run_clock,
             folder=folder,
             every_seconds=checkpoint_seconds,
             every_steps=checkpoint_steps,

@@ -55,8 +55,8 @@ def prepare_resume(folder: RunFolder) -> Path | None:
         checkpoint = _read(path, identity=folder.identity)
         step = checkpoint["global_step"]
         log.info("%s: going on from step %d", folder.path, step)
-    folder.metrics.keep_until(step)
-    folder.steps.keep_until(step)
+    for log_file in folder.logs:
+        log_file.keep_until(step)
     return path if path.exists() else None
 
 

@@ -3,6 +3,8 @@
 "Error against run time" compares methods at equal time, so evaluating and writing checkpoints,
 which are ours and not the method's, stop the clock. Nothing of the method may go on meanwhile, so
 that patches which other processes render are waited for first (`TrainingStream.finish_rendering`).
+
+Run time is either that of the wall clock, or counted with measured costs (`ModelClock`).
 """
 
 from __future__ import annotations
@@ -10,6 +12,9 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any, Protocol
+
+from ngi.energy import EnergyMeter
 
 PHASES = ("explore", "render", "reuse", "score", "train", "other")
 """Phases that are run time; 'other' is whatever lies between the named ones.
@@ -22,14 +27,41 @@ PAUSES = ("evaluate", "checkpoint")
 """Phases during which run time stands still."""
 
 
+class RunClock(Protocol):
+    """The clock by which a budget ends, and by which errors are plotted."""
+
+    name: str
+    """'wall' or 'model'."""
+
+    @property
+    def seconds(self) -> dict[str, float]:
+        """Seconds so far of every phase and pause."""
+        ...
+
+    @property
+    def run_seconds(self) -> float:
+        """Seconds of run time: every phase but evaluation and checkpoints."""
+        ...
+
+
 class PhaseClock:
     """Wall-clock seconds by phase; phases nest, and only the innermost one runs.
 
     `seconds` maps every phase to its seconds so far. The clock stands still until `start`.
+
+    energy: is started and stopped with run time; None where nobody asks for it
     """
 
-    def __init__(self, *, timer: Callable[[], float] = time.perf_counter) -> None:
+    name = "wall"
+
+    def __init__(
+        self,
+        *,
+        timer: Callable[[], float] = time.perf_counter,
+        energy: EnergyMeter | None = None,
+    ) -> None:
         self._timer = timer
+        self.energy = energy or EnergyMeter([])
         self._stack: list[str] = []
         self._since = 0.0
         self.seconds = dict.fromkeys((*PHASES, *PAUSES), 0.0)
@@ -38,11 +70,13 @@ class PhaseClock:
         """Starts or restarts the clock in phase 'other'; time spent before does not count."""
         self._stack = ["other"]
         self._since = self._timer()
+        self.energy.start()
 
     def stop(self) -> None:
         """Counts what has passed and stands still."""
         self._count()
         self._stack = []
+        self.energy.stop()
 
     @contextmanager
     def phase(self, name: str) -> Iterator[None]:
@@ -51,11 +85,15 @@ class PhaseClock:
             raise KeyError(f"unknown phase '{name}', expected one of {list(self.seconds)}")
         self._count()
         self._stack.append(name)
+        if name in PAUSES:
+            self.energy.stop()
         try:
             yield
         finally:
             self._count()
             self._stack.pop()
+            if name in PAUSES and self._stack:
+                self.energy.start()
 
     @property
     def run_seconds(self) -> float:
@@ -63,12 +101,13 @@ class PhaseClock:
         self._count()
         return sum(self.seconds[name] for name in PHASES)
 
-    def state_dict(self) -> dict[str, float]:
+    def state_dict(self) -> dict[str, Any]:
         self._count()
-        return dict(self.seconds)
+        return {"seconds": dict(self.seconds), "joules": self.energy.joules}
 
-    def load_state_dict(self, state: dict[str, float]) -> None:
-        self.seconds.update(state)
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        self.seconds.update(state["seconds"])
+        self.energy.load(state["joules"])
         self._since = self._timer()
 
     def _count(self) -> None:

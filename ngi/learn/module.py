@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import torch
 from torch import Tensor, nn
 
-from ngi.explore import Target
+from ngi.explore import Signals, Target
 from ngi.learn.batch import Batch, Feedback
 from ngi.learn.clock import PhaseClock
 from ngi.learn.lightning_api import LightningModule
@@ -43,7 +43,8 @@ class IlluminationModule(LightningModule):
         self.network = network
         self.loss = loss
         self._make_optimizer = optimizer
-        self._scorer = Scorer(target=target, network=network, loss=loss, clock=clock)
+        self._clock = clock
+        self._scorer = self._scorer_of(target)
 
     def configure_optimizers(self) -> torch.optim.Optimizer:
         return self._make_optimizer(self.network.parameters())
@@ -64,9 +65,7 @@ class IlluminationModule(LightningModule):
             losses, _ = self._losses(batch.patches)
             feedback = Feedback(losses.detach(), None, None)
         else:
-            optimizer = self.optimizers(use_pl_optimizer=False)
-            assert isinstance(optimizer, torch.optim.Optimizer)
-            with self._scorer.watch(batch.patches, batch.current, optimizer) as score:
+            with self._scorer.watch(batch.patches, batch.current, self._optimizer()) as score:
                 losses, prediction = self._losses(batch.patches)
             feedback = Feedback(losses.detach(), *score(prediction, losses))
         return {"loss": self._mean(losses), "feedback": feedback}
@@ -91,6 +90,22 @@ class IlluminationModule(LightningModule):
         with torch.no_grad(), self.trainer.precision_plugin.forward_context():
             output = self.network.render(buffers.to(self.device), scene_vector.to(self.device))  # type: ignore[operator]
         return output.float().cpu()
+
+    def signals(self, patches: Patches, target: Target) -> Signals:
+        """What `target` requires of [n] patches under the present weights and Adam's moments.
+
+        In the precision of training; nothing that training depends on changes.
+        """
+        with self.trainer.precision_plugin.forward_context():
+            return self._scorer_of(target).signals(patches.to(self.device), self._optimizer())
+
+    def _scorer_of(self, target: Target) -> Scorer:
+        return Scorer(target=target, network=self.network, loss=self.loss, clock=self._clock)
+
+    def _optimizer(self) -> torch.optim.Optimizer:
+        optimizer = self.optimizers(use_pl_optimizer=False)
+        assert isinstance(optimizer, torch.optim.Optimizer)
+        return optimizer
 
 
 def seeded(make: Callable[..., T], *, seed: int) -> Callable[..., T]:

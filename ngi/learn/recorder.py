@@ -6,33 +6,41 @@ from typing import Any
 
 from ngi.evaluate import Evaluation, Evaluator
 from ngi.evaluate.evaluator import Predict
-from ngi.learn.clock import PhaseClock
+from ngi.learn.clock import PhaseClock, RunClock
 from ngi.learn.run_folder import RunFolder
 from ngi.learn.stream import TrainingStream
+from ngi.learn.target_map import TargetMap
 from ngi.learn.tracker import Tracker
 from ngi.provenance import provenance
 
 
 class Recorder:
-    """Writes a row of metrics.csv per evaluation, and at the end the pictures and the result."""
+    """Writes a row of metrics.csv per evaluation, and at the end the pictures and the result.
+
+    target_map: measured and kept at every evaluation too, or None
+    """
 
     def __init__(
         self,
         *,
         evaluator: Evaluator,
+        target_map: TargetMap | None,
         predict: Predict,
         folder: RunFolder,
         stream: TrainingStream,
         clock: PhaseClock,
+        run_clock: RunClock,
         tracker: Tracker,
         label: dict[str, Any],
         backend: str,
     ) -> None:
         self._evaluator = evaluator
+        self._target_map = target_map
         self._predict = predict
         self._folder = folder
         self._stream = stream
         self._clock = clock
+        self._run_clock = run_clock
         self._tracker = tracker
         self._label = label
         self._backend = backend
@@ -43,28 +51,38 @@ class Recorder:
             folder=self._folder.path, settings=self._folder.settings, label=self._label
         )
         self._evaluator.prepare()
+        if self._target_map is not None:
+            self._target_map.prepare()
 
     def evaluate(self) -> Evaluation:
         """Evaluates the network as it is, and appends a row to metrics.csv."""
         with self._clock.phase("evaluate"):
             evaluation = self._evaluator.evaluate(self._predict)
-        row = {
+            densities = None if self._target_map is None else self._target_map.measure()
+        row: dict[str, Any] = {
             "step": self._stream.counters.iteration,
-            "run_seconds": self._clock.run_seconds,
-            **{f"{name}_seconds": value for name, value in self._clock.seconds.items()},
+            "run_seconds": self._run_clock.run_seconds,
+            "wall_seconds": self._clock.run_seconds,
+            **{f"{name}_seconds": value for name, value in self._run_clock.seconds.items()},
             "patches_traced": self._stream.counters.patches_traced,
             "paths_traced": self._stream.counters.paths_traced,
             **evaluation.row(),
         }
         self._folder.metrics.append(row)
         self._folder.metrics.flush()
+        if densities is not None:
+            self._folder.target_maps.append(
+                {"step": row["step"], "run_seconds": row["run_seconds"], **densities}
+            )
+            self._folder.target_maps.flush()
         self._tracker.log(row)
         return evaluation
 
     def finish(self) -> dict[str, Any]:
         """The last evaluation, with pictures; writes and returns the result."""
         # Killed between the last row and the result, a resumed run would write that row twice.
-        self._folder.metrics.keep_until(self._stream.counters.iteration - 1)
+        for log in (self._folder.metrics, self._folder.target_maps):
+            log.keep_until(self._stream.counters.iteration - 1)
         evaluation = self.evaluate()
         evaluation.write_pictures(self._folder.pictures)
         counters = self._stream.counters
@@ -75,10 +93,16 @@ class Recorder:
             "label": self._label,
             "seed": self._label["seed"],
             "config": self._folder.settings,
-            "seconds": dict(self._clock.seconds),
-            "run_seconds": self._clock.run_seconds,
+            "clock": self._run_clock.name,
+            "seconds": dict(self._run_clock.seconds),
+            "run_seconds": self._run_clock.run_seconds,
+            "wall_seconds": self._clock.run_seconds,
+            "wall_seconds_by_phase": dict(self._clock.seconds),
+            "energy_joules": self._clock.energy.joules,
+            "energy_sources": self._clock.energy.sources,
             "steps": counters.iteration,
             "generated_batches": counters.generated_batches,
+            "scored_batches": counters.scored_batches,
             "patches_traced": counters.patches_traced,
             "paths_traced": counters.paths_traced,
             "patches_repaired": counters.patches_repaired,

@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from ngi.durable import write_atomically
+from ngi.learn import chain_trace, target_map
+from ngi.learn.record_log import RecordLog
 from ngi.learn.row_log import RowLog
 
 
@@ -32,6 +34,9 @@ class RunFolder:
         self.pictures = path / "pictures"
         self.metrics = RowLog(path / "metrics.csv")
         self.steps = RowLog(path / "steps.csv")
+        self.chains = RecordLog(path / "chains.bin", description=chain_trace.DESCRIPTION)
+        self.target_maps = RecordLog(path / "target_map.bin", description=target_map.DESCRIPTION)
+        self.logs = (self.steps, self.metrics, self.chains, self.target_maps)
         self._result = path / "result.json"
         self._settings = path / "settings.json"
         path.mkdir(parents=True, exist_ok=True)
@@ -61,7 +66,7 @@ class RunFolder:
     def close(self) -> None:
         """Writes the logs out and lets other processes use the folder."""
         with ExitStack() as stack:
-            for part in (self._lock, self.steps, self.metrics):
+            for part in (self._lock, *self.logs):
                 stack.callback(part.close)
 
     def _acquire_lock(self) -> TextIO:

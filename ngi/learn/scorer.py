@@ -80,25 +80,26 @@ class Scorer:
     ) -> Scores:
         with self._clock.phase("score"):
             gradients = self._output_gradients(proposed, output)
-            of_current = self._target(self._signals(current, optimizer))
+            of_current = self._target(self.signals(current, optimizer))
         return lambda: self._target(Signals(losses, gradients, step_norms())), of_current
 
-    def _signals(self, current: Patches, optimizer: torch.optim.Optimizer) -> Signals:
+    def signals(self, patches: Patches, optimizer: torch.optim.Optimizer) -> Signals:
+        """What the network says about [n] patches as they are: in a pass of their own."""
         losses = norms = gradients = None
         if "step_norm" in self._target.requires:
             losses, norms = adam_step_norm(
                 self._network,
                 self._loss,
                 optimizer,
-                current.buffers,
-                current.scene_vector,
-                current.log_radiance,
+                patches.buffers,
+                patches.scene_vector,
+                patches.log_radiance,
             )
         if losses is None or "output_gradient_norm" in self._target.requires:
             with torch.no_grad():
-                output = self._network(current.buffers, current.scene_vector)
-                losses = self._loss(output, current.log_radiance)
-            gradients = self._output_gradients(current, output)
+                output = self._network(patches.buffers, patches.scene_vector)
+                losses = self._loss(output, patches.log_radiance)
+            gradients = self._output_gradients(patches, output)
         return Signals(losses, gradients, norms)
 
     def _output_gradients(self, patches: Patches, output: Tensor) -> Tensor | None:

@@ -12,12 +12,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
 import torch
 from torch.utils.data import IterableDataset
 
 from ngi.explore import ChainInfo, ChainState, MarkovChains, ResolutionSchedule
 from ngi.learn.ahead import ProposalsAhead
 from ngi.learn.batch import Batch, Counters, Feedback
+from ngi.learn.chain_trace import chain_record
 from ngi.learn.clock import PhaseClock
 from ngi.render.protocol import Renderer
 from ngi.reuse import PatchArchive, PatchStore, ReusePolicy
@@ -77,6 +79,7 @@ class TrainingStream(IterableDataset[Batch]):
         self.store = store
         self.counters = Counters()
         self.reuse_probability = 0.0
+        self.chain_record: dict[str, np.ndarray] | None = None  # of a generated batch
         self._chain_info: ChainInfo | None = None
         self._renderer = renderer
         self._archive = archive
@@ -109,7 +112,7 @@ class TrainingStream(IterableDataset[Batch]):
         batch, self._pending = self._pending, None
         losses = feedback.losses.detach().float().cpu()
         with self._clock.phase("explore"):
-            self._chain_info = None
+            self._chain_info = self.chain_record = None
             if batch.generated:
                 self._accept(batch, feedback)
         with self._clock.phase("reuse"):
@@ -223,19 +226,27 @@ class TrainingStream(IterableDataset[Batch]):
             patches = self.store.get(ids)  # in the precision of every later look at them
             score_current = self.sampler.needs_current and bool(self._chains.occupied.all())
             current = self.store.get(self._chains.patch) if score_current else None
+        self.counters.scored_batches += score_current
         return Batch(patches, ids, generated=True, current=current)
 
     def _accept(self, batch: Batch, feedback: Feedback) -> None:
         assert self._ahead is not None
         unscored = torch.zeros(self.sampler.chains)  # looked at by no rule
         proposed, current = feedback.target_proposed, feedback.target_current
+        scored = unscored if proposed is None else proposed()
         self._chains, self._chain_info = self.sampler.accept(
             self._chains,
             self._ahead.proposals,
             batch.ids,
             target_current=unscored if current is None else current,
-            target_proposed=unscored if proposed is None else proposed(),
+            target_proposed=scored,
             generator=self._generator,
+        )
+        self.chain_record = chain_record(
+            self._ahead.proposals,
+            self._chain_info,
+            target_proposed=None if proposed is None else scored,
+            target_current=current,
         )
         self._ahead = None
         self.store.pin(self._chains.patch)

@@ -1,5 +1,6 @@
 import pytest
 
+from ngi.energy import EnergyCounter, EnergyMeter
 from ngi.learn.clock import PAUSES, PHASES, PhaseClock
 
 
@@ -84,6 +85,34 @@ def test_seconds_survive_a_resume() -> None:
         timer.now += 2
     assert second.seconds["render"] == 5
     assert second.run_seconds == 5
+
+
+def test_energy_is_that_of_run_time() -> None:
+    joules = [0.0]
+    meter = EnergyMeter([EnergyCounter("processor", lambda: joules[0])])
+    clock = PhaseClock(energy=meter)
+    joules[0] += 1
+    clock.start()
+    joules[0] += 2
+    for pause in PAUSES:
+        with clock.phase(pause):
+            joules[0] += 4
+            state = clock.state_dict()
+    with clock.phase("train"):
+        joules[0] += 8
+    clock.stop()
+    joules[0] += 16
+    with clock.phase("evaluate"):  # the last evaluation, after training
+        joules[0] += 32
+    joules[0] += 64
+    assert clock.energy.joules == 10
+    assert state["joules"] == 2
+
+    resumed = PhaseClock(energy=EnergyMeter([EnergyCounter("processor", lambda: joules[0])]))
+    resumed.load_state_dict(state)
+    resumed.start()
+    joules[0] += 3
+    assert resumed.energy.joules == 5
 
 
 def test_unknown_phase_is_named() -> None:

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from ngi.learn import PhaseClock, Steps, TrainingStream
+from ngi.learn import Budget, PhaseClock, TrainingStream
 from ngi.learn.callbacks import BudgetAndCheckpoint, PeriodicEvaluation
 from ngi.reuse import FixedProbability
 from tests.learn.late_renderers import Manual, ManualJob
@@ -23,7 +23,7 @@ def late(folder: Path) -> tuple[TrainingStream, ManualJob, PhaseClock]:
     for _ in steps(stream, 5):
         pass
     assert not renderer.jobs[-1].done()
-    clock.load_state_dict(dict.fromkeys(clock.seconds, 0.0))
+    clock.load_state_dict(PhaseClock().state_dict())
     clock.start()
     return stream, renderer.jobs[-1], clock
 
@@ -33,7 +33,7 @@ def test_an_evaluation_waits_in_run_time_for_patches_under_way(tmp_path: Path) -
     seen = []
     recorder: Any = SimpleNamespace(evaluate=lambda: seen.append(job.done()))
     evaluation = PeriodicEvaluation(
-        recorder=recorder, count=2, budget=Steps(steps=8), stream=stream, clock=clock
+        recorder=recorder, count=2, budget=Budget(steps=8), stream=stream, run_clock=clock
     )
     evaluation.on_train_batch_end()
     assert seen == [True]
@@ -49,16 +49,16 @@ def test_a_checkpoint_waits_for_patches_unless_the_run_is_over(
     folder: Any = SimpleNamespace(
         path=tmp_path / "run",
         checkpoint=tmp_path / "last.ckpt",
-        steps=SimpleNamespace(flush=lambda: None),
-        metrics=SimpleNamespace(flush=lambda: None),
+        logs=(),
     )
     trainer: Any = SimpleNamespace(
         should_stop=False, save_checkpoint=lambda _: seen.append(job.done())
     )
     callback = BudgetAndCheckpoint(
-        budget=Steps(steps=budget),
+        budget=Budget(steps=budget),
         stream=stream,
         clock=clock,
+        run_clock=clock,
         folder=folder,
         every_seconds=1e9,
         every_steps=5,

@@ -63,6 +63,8 @@ def test_a_killed_run_ends_bit_for_bit_like_an_unbroken_one(
             torch.load(tmp_path / "run" / "patches" / name, weights_only=True),
             torch.load(unbroken / "patches" / name, weights_only=True),
         )
+    chains = [(f / "chains.bin").read_bytes() for f in (tmp_path / "run", unbroken)]
+    assert chains[0] == chains[1]
     ours, theirs = (
         pd.read_csv(f / "steps.csv").drop(columns="run_seconds")
         for f in (tmp_path / "run", unbroken)
@@ -72,7 +74,7 @@ def test_a_killed_run_ends_bit_for_bit_like_an_unbroken_one(
 
 def test_real_renders_with_growing_resolution_resume_bit_for_bit(tmp_path: Path) -> None:
     options = (
-        "experiment=smoke",
+        "budget=smoke",
         "scene=mirror",
         "budget.steps=24",
         "resolution=growing",

@@ -1,0 +1,178 @@
+"""Measures what the steps of runs cost, for `budget.clock=model`: `python -m ngi.costs --help`."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import sys
+from collections.abc import Sequence
+from contextlib import closing
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+import hydra
+from hydra.errors import CompactHydraException
+from hydra.utils import instantiate
+from omegaconf import DictConfig, OmegaConf, open_dict
+from tabulate import tabulate
+
+from ngi.build import build_module, build_stream, plain, run_components
+from ngi.memory import keep_freed_memory
+from ngi.resources import cache_folder, root
+from ngi.train import register
+
+if TYPE_CHECKING:
+    from ngi.learn import Component, CostFile
+    from ngi.render import Renderer
+
+log = logging.getLogger(__name__)
+
+SECONDS = 6.0
+"""Of timings per component; more where that is not enough for a few rounds."""
+BUSY = 0.5
+"""Load average, over the last minute, from which on others disturb the measurement."""
+
+_looked_at: set[str] = set()
+"""Runs that differ from an earlier one of this sweep by their seeds need no second look."""
+
+
+def measure(config: DictConfig) -> None:
+    """Adds the components of this run that the cost file lacks, and prints them.
+
+    Patches are rendered in this process, whatever `renderer.workers` says. Training is timed on
+    patches of closed formulas, with buffers and variables as the scene's. Raises ValueError for a
+    cost file that is damaged and for what `ngi.train` refuses too.
+    """
+    from ngi import learn
+
+    settings = {**plain(config), "seed": None, "run": None, "label": None}
+    if (name := json.dumps(settings, sort_keys=True)) in _looked_at:
+        return
+    _looked_at.add(name)
+    keep_freed_memory()
+    file = learn.CostFile(Path(config.budget.costs))
+    with closing(instantiate(_in_this_process(config.renderer))) as renderer:
+        wanted = run_components(config, renderer=renderer)
+        missing = file.missing(wanted)
+        if missing:
+            _measure(config, missing, renderer=renderer, file=file)
+    print(_table(wanted, new=missing, file=file), flush=True)
+
+
+def _measure(
+    config: DictConfig, missing: list[Component], *, renderer: Renderer, file: CostFile
+) -> None:
+    from ngi.benchmark.step_costs import rendering_seconds
+    from ngi.provenance import provenance
+
+    _warn_if_busy()
+    for component in missing:
+        log.info("measuring %s", component.key)
+    measured = {}
+    if names := {component.name for component in missing} - {"rendering"}:
+        measured = _step_seconds(config, renderer=renderer, scored="scoring" in names)
+    if any(component.name == "rendering" for component in missing):
+        measured["rendering"] = rendering_seconds(
+            renderer, patches=config.sampler.chains, seconds=SECONDS
+        )
+    found = provenance(backend=renderer.description)
+    measured_by = {key: found[key] for key in ("commit", "dirty", "machine")}
+    for component in missing:
+        file.add(component, measured[component.name], measured_by=measured_by)
+
+
+def _step_seconds(
+    config: DictConfig, *, renderer: Renderer, scored: bool
+) -> dict[str, dict[str, list[float]]]:
+    """Trains for a few seconds, with steps of all kinds in turn."""
+    from ngi import learn
+    from ngi.benchmark.step_costs import StepTimer, step_seconds
+    from ngi.render import AnalyticRenderer
+
+    stand_in = AnalyticRenderer(
+        dimensions=renderer.dimensions, patch_size=renderer.patch_size, layout=renderer.layout
+    )
+    config = config.copy()
+    with open_dict(config):
+        here = "ngi.benchmark.step_costs"
+        config.reuse.policy = {"_target_": f"{here}.InTurn"}
+        config.sampler.acceptance = {"_target_": f"{here}.ScoredInTurn", "scored": scored}
+    with TemporaryDirectory() as folder:
+        clock = learn.PhaseClock()
+        run = learn.RunFolder(Path(folder), settings={})
+        stream = build_stream(config, renderer=stand_in, clock=clock, patches=run.patches)
+        module = build_module(config, renderer=stand_in, target=stream.sampler.target, clock=clock)
+        timer = StepTimer(clock=clock, scored=scored, seconds=SECONDS)
+        feedback = learn.SamplerFeedback(
+            stream=stream, clock=clock, run_clock=clock, folder=run, tracker=learn.Local()
+        )
+        trainer = instantiate(config.trainer)(
+            default_root_dir=folder, max_steps=-1, callbacks=[feedback, timer]
+        )
+        with closing(run):
+            trainer.fit(module, learn.ExplorationDataModule(stream=stream))
+    return step_seconds(timer.rounds())
+
+
+@cache
+def _warn_if_busy() -> None:
+    """Once per process, before its own measuring makes the machine busy."""
+    load, *_ = os.getloadavg()
+    if load > BUSY:
+        log.warning(
+            "this machine is busy (load average %.1f on %d cores): costs measured now are those of "
+            "a busy machine; stop what else is running, delete them from the file, measure again",
+            load,
+            os.cpu_count() or 1,
+        )
+
+
+def _in_this_process(renderer: DictConfig) -> DictConfig:
+    serial = {"workers": 0, "cluster": None} if "workers" in renderer else {}
+    return OmegaConf.merge(renderer, serial)  # type: ignore[return-value]
+
+
+def _table(wanted: list[Component], *, new: list[Component], file: CostFile) -> str:
+    rows: list[list[Any]] = []
+    costs = file.costs(wanted)
+    for component in wanted:
+        for phase, seconds in costs[component.name].items():
+            rows.append([component.key, phase, 1e3 * seconds, "new" if component in new else ""])
+    return tabulate(rows, headers=["component", "phase", "ms per step", ""], floatfmt=".2f")
+
+
+# Its log is kept beside the cost file; the runs' own folders are left alone.
+@hydra.main(version_base="1.3", config_path=str(root() / "conf"), config_name="train")
+def _main(config: DictConfig) -> None:
+    try:
+        measure(config)
+    except (ValueError, OSError, RuntimeError, FloatingPointError, TypeError) as error:
+        log.error("%s", error)
+        log.debug("traceback", exc_info=True)
+        raise CompactHydraException(str(error)) from error
+
+
+def main() -> None:
+    """Entry point of `python -m ngi.costs` and `ngi-costs`."""
+    register()
+    folder = cache_folder() / "costs"
+    places = (f"hydra.{mode}.dir={folder}" for mode in ("run", "sweep"))
+    sys.argv[1:] = with_overrides(sys.argv[1:], "hydra/help=costs", *places)
+    _main()
+
+
+def with_overrides(arguments: Sequence[str], *overrides: str) -> list[str]:
+    """Hydra's command line with further overrides, before all others: those that follow win.
+
+    Overrides have to stand together, which argparse asks for.
+    """
+    are_overrides = ("=" in argument and argument[0] != "-" for argument in arguments)
+    first = next((i for i, is_override in enumerate(are_overrides) if is_override), len(arguments))
+    return [*arguments[:first], *overrides, *arguments[first:]]
+
+
+if __name__ == "__main__":
+    main()
