@@ -1,5 +1,10 @@
-"""From the files that runs leave behind to tables, plots and pictures.
+"""From the files that runs leave behind to tables, plots, pictures and verdicts.
 
 Reads files only: nothing of `ngi` is imported, so results can be reported where it is not
-installed.
+installed. `load_runs(folder)` gives the runs as pandas frames; `analysis/examples` shows how they
+answer questions.
 """
+
+from analysis.library import Results, load_runs
+
+__all__ = ["Results", "load_runs"]

@@ -8,13 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.runs import Run
+from analysis.statistics import estimate
 
 
 @dataclass(frozen=True)
 class Curve:
     """A method's error over time. All arrays have shape [times].
 
-    seconds: run time without evaluations; mean: over the seeds; low, high: their range; n: seeds
+    seconds: run time without evaluations; mean: over the seeds; low, high: its 95 % interval, the
+    mean itself for one seed; n: seeds
     """
 
     seconds: np.ndarray
@@ -30,6 +32,9 @@ def error_curve(runs: Sequence[Run], key: str) -> Curve | None:
     The seeds are evaluated at slightly different times: the curve has the first run's, as far as
     all runs cover them, and the others are interpolated linearly. Evaluations that were NaN or
     Inf are left out. None where a run has no values.
+
+    The interval is Student's over the seeds, of the mean's logarithm (to first order its standard
+    error is the mean's relative one), so that it stays above 0 with three seeds too.
     """
     series = []
     for run in runs:
@@ -46,4 +51,11 @@ def error_curve(runs: Sequence[Run], key: str) -> Curve | None:
         return None
     times = np.unique(series[0][:, 0].clip(start, end))
     values = np.stack([np.interp(times, points[:, 0], points[:, 1]) for points in series])
-    return Curve(times, values.mean(axis=0), values.min(axis=0), values.max(axis=0), len(runs))
+    mean = values.mean(axis=0)
+    factor = np.exp([_relative_half_width(column) for column in values.T])
+    return Curve(times, mean, mean / factor, mean * factor, len(runs))
+
+
+def _relative_half_width(values: np.ndarray) -> float:
+    mean = estimate(values.tolist())
+    return 0.0 if mean.half_width is None or mean.mean == 0 else mean.half_width / mean.mean

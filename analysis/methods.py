@@ -8,31 +8,61 @@ from dataclasses import replace
 from analysis.runs import DISTINCTIONS, Run
 
 BASELINE = "uniform"
-"""The sampler that others are compared with; it comes first."""
+"""The method (and sampler) that others are compared with; it comes first."""
+
+TITLES = {
+    "uniform": "uniform sampling",
+    "active_exploration": "Active Exploration",
+    "metropolis": "Metropolis acceptance",
+    "loss_target": "the loss alone as target",
+    "output_gradient_target": "loss × output gradient as target",
+    "no_preconditioning": "no position preconditioning",
+    "constant_resolution": "exploration at constant resolution",
+    "uniform_growing": "uniform sampling with growing resolution",
+    "traced_specular": "traced specular bounces",
+}
+"""What tables and pictures call the options of the configuration group `method`, in order."""
 
 
 def name_methods(runs: Sequence[Run]) -> list[Run]:
-    """The same runs with `method` set: the sampler, and what else its methods need to differ by.
+    """The same runs with `method` set: what was chosen, and what else their methods differ by.
 
-    'uniform' and 'mcmc_loss' suffice where each sampler was run in one way. Otherwise the fewest
-    label fields that tell a sampler's runs apart follow: 'mcmc_loss, growing'.
+    What was chosen is the option of the group `method`, or without one the sampler. 'uniform' and
+    'mcmc_loss' suffice where each was run in one way. Otherwise the fewest label fields that tell
+    its runs apart follow: 'mcmc_loss, growing'.
     """
     named = []
     for run in runs:
-        same_sampler = [other for other in runs if other.label["sampler"] == run.label["sampler"]]
-        fields = _telling_fields(same_sampler)
-        parts = [run.label["sampler"], *(_value(run, field, same_sampler) for field in fields)]
+        alike = [other for other in runs if _chosen(other) == _chosen(run)]
+        fields = _telling_fields(alike)
+        parts = [_chosen(run), *(_value(run, field, alike) for field in fields)]
         named.append(replace(run, method=", ".join(part for part in parts if part)))
     return named
 
 
+def _chosen(run: Run) -> str:
+    return run.label.get("method") or run.label["sampler"]
+
+
 def methods_in_order(runs: Sequence[Run]) -> list[str]:
-    """The methods' names: the baseline's first, then by name."""
-    return sorted({run.method for run in runs}, key=lambda name: (not is_baseline(name), name))
+    """The methods' names: the baseline's first, then in the order of `TITLES`, then by name."""
+    known = list(TITLES)
+
+    def position(name: str) -> tuple[bool, int, str]:
+        base = name.split(", ")[0]
+        return not is_baseline(name), known.index(base) if base in known else len(known), name
+
+    return sorted({run.method for run in runs}, key=position)
 
 
 def is_baseline(method: str) -> bool:
     return method.split(", ")[0] == BASELINE
+
+
+def title(method: str) -> str:
+    """A method's name for readers: 'Active Exploration, never' for 'active_exploration, never'."""
+    base, *rest = method.split(", ")
+    return ", ".join([TITLES.get(base, base), *rest])
 
 
 def _telling_fields(runs: Sequence[Run]) -> list[str]:

@@ -11,7 +11,7 @@ import matplotlib
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from analysis.methods import methods_in_order
+from analysis.methods import methods_in_order, title
 from analysis.runs import Run
 
 PANEL = 256
@@ -26,7 +26,7 @@ _BAR = (200, 12)
 
 
 @dataclass(frozen=True)
-class _FrameOfMethods:
+class FrameOfMethods:
     """One hard frame, and per method the run that predicted it."""
 
     index: int
@@ -42,34 +42,70 @@ class _FrameOfMethods:
         return max(values) - min(values) if values else 0.0
 
 
-def write_comparisons(runs: Sequence[Run], folder: Path) -> tuple[list[Path], list[str]]:
-    """Writes comparison sheets of the hard frames of every scene.
+@dataclass(frozen=True)
+class ErrorScale:
+    """What an error map's colours mean.
 
-    Per scene `<scene>.png`, the frames in which the methods' MAPEs differ most, and
-    `<scene>/hard_<index>.png` for all of them; every method shows its lowest seed. Returns what
-    was written, overviews and folders, and a warning per scene whose pictures are missing.
+    bar: RGB, its colours from no error on the left to `maximum` on the right; text: what is shown
     """
-    written, warnings = [], []
-    for scene in sorted({run.scene for run in runs}):
-        of_scene = [run for run in runs if run.scene == scene]
-        chosen = {
-            method: min((r for r in of_scene if r.method == method), key=lambda r: r.seed)
-            for method in methods_in_order(of_scene)
-        }
-        indices = sorted(set.intersection(*(set(_frame_mapes(run)) for run in chosen.values())))
-        frames = [_FrameOfMethods(index, chosen) for index in indices]
-        telling = sorted(frames, key=lambda frame: -frame.spread)[:MOST_DIFFERENT]
-        overview, every = folder / f"{scene}.png", folder / scene
-        try:
-            every.mkdir(parents=True, exist_ok=True)
-            for frame in frames:
-                _sheet([frame]).save(every / f"hard_{frame.index:02d}.png")
-            _sheet(telling).save(overview)
-        except OSError as error:
-            warnings.append(f"no comparison pictures of {scene}: {error}")
-            continue
-        written += [overview, every]
-    return written, warnings
+
+    bar: Image.Image
+    maximum: str
+    text: str
+
+
+def frames_of_scene(runs: Sequence[Run]) -> list[FrameOfMethods]:
+    """The hard frames that all methods of one scene have, those that differ most first.
+
+    Every method is represented by its lowest seed.
+    """
+    chosen = {
+        method: min((run for run in runs if run.method == method), key=lambda run: run.seed)
+        for method in methods_in_order(runs)
+    }
+    indices = sorted(set.intersection(*(set(_frame_mapes(run)) for run in chosen.values())))
+    frames = [FrameOfMethods(index, chosen) for index in indices]
+    return sorted(frames, key=lambda frame: -frame.spread)
+
+
+def write_comparisons(runs: Sequence[Run], folder: Path) -> tuple[list[Path], list[str]]:
+    """Writes comparison sheets of the hard frames of one scene.
+
+    `<scene>.png` has the frames in which the methods' MAPEs differ most, and
+    `<scene>/hard_<index>.png` are all of them; every method shows its lowest seed. Returns what
+    was written, overview and folder, and a warning where pictures are missing.
+    """
+    scene, frames = runs[0].scene, frames_of_scene(runs)
+    overview, every = folder / f"{scene}.png", folder / scene
+    try:
+        every.mkdir(parents=True, exist_ok=True)
+        for frame in frames:
+            _sheet([frame]).save(every / f"hard_{frame.index:02d}.png")
+        _sheet(frames[:MOST_DIFFERENT]).save(overview)
+    except OSError as error:
+        return [], [f"no comparison pictures of {scene}: {error}"]
+    return [overview, every], []
+
+
+def picture(run: Run, index: int, kind: str) -> Image.Image:
+    """A hard frame's 'reference', 'prediction' or 'error' as sRGB; OSError where it is missing."""
+    with Image.open(_file(run, index, kind)) as file:
+        return file.convert("RGB")
+
+
+def error_scale(run: Run, index: int) -> ErrorScale:
+    """The scale that an error map's file says it has; OSError where it says none."""
+    path = _file(run, index, "error")
+    with Image.open(path) as file:
+        said = dict(file.info)
+    try:
+        text, name, maximum = said["scale"], said["colour_map"], said["maximum"]
+    except KeyError as error:
+        raise OSError(f"{path} does not say its {error}") from error
+    width, height = _BAR
+    levels = np.tile(np.linspace(0, 1, width), (height, 1))
+    colours = np.ascontiguousarray(matplotlib.colormaps[name](levels, bytes=True)[..., :3])
+    return ErrorScale(Image.fromarray(colours), maximum, text)
 
 
 def _frame_mapes(run: Run) -> dict[int, float]:
@@ -77,7 +113,7 @@ def _frame_mapes(run: Run) -> dict[int, float]:
     return {frame["index"]: frame["mape"] for frame in frames if frame["set"] == "hard"}
 
 
-def _sheet(frames: Sequence[_FrameOfMethods]) -> Image.Image:
+def _sheet(frames: Sequence[FrameOfMethods]) -> Image.Image:
     """A row per frame, and below them what the error maps' colours mean."""
     rows = [_row(frame) for frame in frames]
     legend_top = sum(row.height for row in rows) + _MARGIN
@@ -89,29 +125,30 @@ def _sheet(frames: Sequence[_FrameOfMethods]) -> Image.Image:
         sheet.paste(row, (0, top))
         top += row.height
     first = frames[0]
-    _draw_error_scale(sheet, next(iter(first.runs.values())), first.index, legend_top)
+    scale = error_scale(next(iter(first.runs.values())), first.index)
+    _draw_error_scale(sheet, scale, legend_top)
     return sheet
 
 
-def _row(frame: _FrameOfMethods) -> Image.Image:
+def _row(frame: FrameOfMethods) -> Image.Image:
     panels: list[tuple[str, Image.Image]] = []
     for method, run in frame.runs.items():
         if not panels:
             label = f"reference, hard frame {frame.index}"
-            panels.append((label, _picture(run, frame.index, "reference")))
-        prediction = _picture(run, frame.index, "prediction")
-        panels.append((f"{method} (seed {run.seed})", prediction))
-        error = _picture(run, frame.index, "error")
+            panels.append((label, _enlarged(run, frame.index, "reference")))
+        prediction = _enlarged(run, frame.index, "prediction")
+        panels.append((f"{title(method)} (seed {run.seed})", prediction))
+        error = _enlarged(run, frame.index, "error")
         panels.append((f"its error, MAPE {frame.mape(method):.3f}", error))
     width, height = panels[0][1].size
     row = Image.new(
         "RGB", (_MARGIN + (width + _MARGIN) * len(panels), _MARGIN + _LINE + height), "white"
     )
     draw = ImageDraw.Draw(row)
-    for column, (label, picture) in enumerate(panels):
+    for column, (label, image) in enumerate(panels):
         left = _MARGIN + column * (width + _MARGIN)
         draw.text((left, _MARGIN), _fitted(label, width), fill="black", font=_font(14))
-        row.paste(picture, (left, _MARGIN + _LINE))
+        row.paste(image, (left, _MARGIN + _LINE))
     return row
 
 
@@ -123,31 +160,20 @@ def _fitted(label: str, width: int) -> str:
     return label
 
 
-def _picture(run: Run, index: int, kind: str) -> Image.Image:
-    with Image.open(_file(run, index, kind)) as file:
-        picture = file.convert("RGB")
-    factor = max(1, PANEL // picture.height)
-    size = (picture.width * factor, picture.height * factor)
-    return picture.resize(size, Image.Resampling.NEAREST)
+def _enlarged(run: Run, index: int, kind: str) -> Image.Image:
+    image = picture(run, index, kind)
+    factor = max(1, PANEL // image.height)
+    return image.resize((image.width * factor, image.height * factor), Image.Resampling.NEAREST)
 
 
-def _draw_error_scale(sheet: Image.Image, run: Run, index: int, top: int) -> None:
-    """A colour bar and what it stands for, as the error map's file says."""
-    path = _file(run, index, "error")
-    with Image.open(path) as file:
-        said = dict(file.info)
-    try:
-        scale, name, maximum = said["scale"], said["colour_map"], said["maximum"]
-    except KeyError as error:
-        raise OSError(f"{path} does not say its {error}") from error
-    width, height = _BAR
-    levels = np.tile(np.linspace(0, 1, width), (height, 1))
-    colours = np.ascontiguousarray(matplotlib.colormaps[name](levels, bytes=True)[..., :3])
-    draw, font, middle = ImageDraw.Draw(sheet), _font(13), top + height // 2
+def _draw_error_scale(sheet: Image.Image, scale: ErrorScale, top: int) -> None:
+    """A colour bar and what it stands for."""
+    draw, font, middle = ImageDraw.Draw(sheet), _font(13), top + scale.bar.height // 2
     draw.text((_MARGIN, middle), "0", fill="black", font=font, anchor="lm")
-    sheet.paste(Image.fromarray(colours), (_MARGIN + 14, top))
-    text = f"≥ {maximum}     error: {scale}"
-    draw.text((_MARGIN + 20 + width, middle), text, fill="black", font=font, anchor="lm")
+    sheet.paste(scale.bar, (_MARGIN + 14, top))
+    text = f"≥ {scale.maximum}     error: {scale.text}"
+    left = _MARGIN + 20 + scale.bar.width
+    draw.text((left, middle), text, fill="black", font=font, anchor="lm")
 
 
 def _file(run: Run, index: int, kind: str) -> Path:

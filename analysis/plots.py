@@ -1,20 +1,22 @@
-"""Error against run time: one figure per scene, a panel per metric and set of frames."""
+"""Error against run time: a panel per metric, with a band for what the seeds leave open."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, Locator, LogLocator, MaxNLocator, NullLocator
 
 from analysis.curves import Curve, error_curve
-from analysis.methods import methods_in_order
+from analysis.methods import methods_in_order, title
 from analysis.runs import METRICS, SETS, Run
 from analysis.tables import TITLES
 
@@ -25,9 +27,12 @@ DASHES = ("-", (0, (5, 1.5)), (0, (1, 1.2)))
 """From the eighth method on, colours come again with another line style."""
 
 LOG_RATIO = 4.0
-"""The error axis is logarithmic where its largest value is so many times its smallest."""
+"""From this ratio of largest to smallest value on, ticks stand at 1, 2, 5, 10, …"""
 
-_STYLE: dict[Any, Any] = {
+LINE_WIDTH = 1.4
+"""Of a method's curve, in points."""
+
+STYLE: dict[Any, Any] = {
     "font.size": 9,
     "axes.spines.top": False,
     "axes.spines.right": False,
@@ -38,6 +43,10 @@ _STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "analysis",
 }
+"""Settings of matplotlib for every figure of a report."""
+
+_DATES = {"png": "Creation Time", "svg": "Date"}
+"""Metadata that would make a file differ from one report to the next."""
 
 
 def method_styles(runs: Sequence[Run]) -> dict[str, dict[str, Any]]:
@@ -51,104 +60,137 @@ def method_styles(runs: Sequence[Run]) -> dict[str, dict[str, Any]]:
     }
 
 
-def write_error_curves(
-    runs: Sequence[Run], styles: Mapping[str, dict[str, Any]], folder: Path
-) -> list[Path]:
-    """Writes `error_<scene>.png` and `.svg` for every scene and returns their paths."""
-    written = []
-    for scene in sorted({run.scene for run in runs}):
-        of_scene = [run for run in runs if run.scene == scene]
-        with matplotlib.rc_context(_STYLE):
-            figure = _figure(scene, of_scene, styles)
-            for suffix, dated in (("png", "Creation Time"), ("svg", "Date")):
-                path = folder / f"error_{scene}.{suffix}"
-                # Without its date the same runs give the same file.
-                figure.savefig(path, dpi=160, metadata={dated: None})
-                written.append(path)
-    return written
-
-
-def _figure(scene: str, runs: Sequence[Run], styles: Mapping[str, dict[str, Any]]) -> Figure:
-    figure = Figure(figsize=(3.0 * len(METRICS), 5.6), layout="constrained")
+def new_figure(width: float, height: float) -> Figure:
+    """A figure of this size in inches that arranges its panels itself and opens no window."""
+    figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
-    panels = figure.subplots(len(SETS), len(METRICS), squeeze=False)
-    for row, set_name in enumerate(SETS):
-        for column, metric in enumerate(METRICS):
-            axes = panels[row, column]
-            _panel(
-                axes,
-                runs,
-                f"{set_name}_{metric}",
-                runs[0].metric(set_name, metric, "floor"),
-                styles,
-            )
-            axes.set_title(f"{TITLES[metric]}, {set_name} frames", fontsize=9, loc="left")
-            if row == len(SETS) - 1:
-                axes.set_xlabel("run time in seconds")
-    handles = {
-        label: handle
-        for axes in panels.flat
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
-    }
-    figure.legend(
-        handles.values(), handles.keys(), loc="outside lower center", ncols=4, frameon=False
-    )
-    figure.suptitle(f"{scene}: error against run time (band: range of the seeds)", fontsize=10)
     return figure
 
 
-def _panel(
-    axes: Axes,
-    runs: Sequence[Run],
-    key: str,
-    floor: float | None,
+def figure_bytes(figure: Figure, suffix: str) -> bytes:
+    """The figure as a `png` or `svg` file without its date: the same runs give the same bytes."""
+    stream = BytesIO()
+    figure.savefig(stream, format=suffix, dpi=160, metadata={_DATES[suffix]: None})
+    return stream.getvalue()
+
+
+def save_figure(figure: Figure, folder: Path, name: str) -> list[Path]:
+    """Writes `<name>.png` and `<name>.svg` into `folder` and returns their paths."""
+    paths = [folder / f"{name}.{suffix}" for suffix in _DATES]
+    for path in paths:
+        path.write_bytes(figure_bytes(figure, path.suffix[1:]))
+    return paths
+
+
+@dataclass(frozen=True)
+class ErrorPanel:
+    """One diagram: a metric on a set of frames, for runs of one scene, a curve per method."""
+
+    title: str
+    runs: Sequence[Run]
+    set_name: str
+    metric: str
+    log_time: bool = False
+
+
+def scene_panels(runs: Sequence[Run], set_name: str, *, log_time: bool = False) -> list[ErrorPanel]:
+    """A panel per metric for the runs of one scene."""
+    return [
+        ErrorPanel(f"{TITLES[metric]}, {set_name} frames", runs, set_name, metric, log_time)
+        for metric in METRICS
+    ]
+
+
+def write_error_curves(
+    runs: Sequence[Run], styles: Mapping[str, dict[str, Any]], folder: Path
+) -> list[Path]:
+    """Writes `error_<scene>.png` and `.svg` for the runs of one scene and returns their paths."""
+    scene = runs[0].scene
+    with matplotlib.rc_context(STYLE):
+        rows = [scene_panels(runs, set_name) for set_name in SETS]
+        figure = error_figure(rows, styles)
+        figure.suptitle(f"{scene}: error against run time (band: 95 % interval)", fontsize=10)
+        return save_figure(figure, folder, f"error_{scene}")
+
+
+def error_figure(
+    rows: Sequence[Sequence[ErrorPanel]],
     styles: Mapping[str, dict[str, Any]],
-) -> None:
+    *,
+    legend: bool = True,
+) -> Figure:
+    """Panels in rows of equal length under one legend; expects `STYLE` to be in force."""
+    columns = len(rows[0])
+    figure = new_figure(3.0 * columns, 2.35 * len(rows) + 0.9 * legend)
+    axes_grid = figure.subplots(len(rows), columns, squeeze=False)
+    for axes_row, panels in zip(axes_grid, rows, strict=True):
+        for axes, panel in zip(axes_row, panels, strict=True):
+            _draw(axes, panel, styles)
+            axes.set_title(panel.title, fontsize=9, loc="left")
+    for axes in axes_grid[-1]:
+        axes.set_xlabel("run time in seconds")
+    if legend:
+        handles = {
+            label: handle
+            for axes in axes_grid.flat
+            for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
+        }
+        figure.legend(
+            handles.values(), handles.keys(), loc="outside lower center", ncols=4, frameon=False
+        )
+    return figure
+
+
+def _draw(axes: Axes, panel: ErrorPanel, styles: Mapping[str, dict[str, Any]]) -> None:
+    key = f"{panel.set_name}_{panel.metric}"
     curves: list[Curve] = []
-    for method in methods_in_order(runs):
-        curve = error_curve([run for run in runs if run.method == method], key)
+    for method in methods_in_order(panel.runs):
+        curve = error_curve([run for run in panel.runs if run.method == method], key)
         if curve is None:
             continue
         curves.append(curve)
         seeds = "1 seed" if curve.n == 1 else f"{curve.n} seeds"
-        axes.plot(
-            curve.seconds,
-            curve.mean,
-            marker="o",
-            markersize=2.5,
-            linewidth=1.4,
-            label=f"{method} ({seeds})",
-            **styles[method],
-        )
-        axes.fill_between(
-            curve.seconds,
-            curve.low,
-            curve.high,
-            color=styles[method]["color"],
-            alpha=0.18,
-            linewidth=0,
-        )
+        draw_band(axes, curve, label=f"{title(method)} ({seeds})", **styles[method])
     if not curves:
         axes.text(0.5, 0.5, "not measured", transform=axes.transAxes, ha="center", va="center")
         axes.set(xticks=[], yticks=[])
         return
+    values = np.concatenate([array for c in curves for array in (c.mean, c.low, c.high)])
+    floor = panel.runs[0].metric(panel.set_name, panel.metric, "floor")
     if floor is not None:
         axes.axhline(
             floor, color="#666666", linestyle=(0, (4, 3)), linewidth=1, label="reference noise"
         )
-    values = np.concatenate([c.low for c in curves] + [c.high for c in curves])
-    _scale_errors(axes, values if floor is None else np.append(values, floor))
+        values = np.append(values, floor)
+    _make_logarithmic(axes, "y", values)
+    if panel.log_time:
+        _make_logarithmic(axes, "x", np.concatenate([curve.seconds for curve in curves]))
 
 
-def _scale_errors(axes: Axes, values: np.ndarray) -> None:
-    """Logarithmic where the values span enough of it; plain numbers at the ticks.
+def draw_band(axes: Axes, curve: Curve, *, label: str, color: str, linestyle: Any = "-") -> None:
+    """A curve's mean as a line with markers, and its interval as a band."""
+    axes.plot(
+        curve.seconds,
+        curve.mean,
+        marker="o",
+        markersize=2.5,
+        linewidth=LINE_WIDTH,
+        label=label,
+        color=color,
+        linestyle=linestyle,
+    )
+    axes.fill_between(curve.seconds, curve.low, curve.high, color=color, alpha=0.18, linewidth=0)
 
-    Time stays linear: evaluations are spread evenly over it.
-    """
-    if values.min() <= 0 or values.max() < LOG_RATIO * values.min():
+
+def _make_logarithmic(axes: Axes, direction: Literal["x", "y"], values: np.ndarray) -> None:
+    """A logarithmic axis with plain numbers at the ticks; left linear where no value is above 0."""
+    positive = values[np.isfinite(values) & (values > 0)]
+    if not len(positive):
         return
-    axes.set_yscale("log")
-    decades = np.log10(values.max() / values.min())
-    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if decades < 2.5 else (1.0,)))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.set(**{f"{direction}scale": "log"})
+    axis = axes.xaxis if direction == "x" else axes.yaxis
+    ratio = positive.max() / positive.min()
+    locator: Locator = LogLocator(subs=(1.0, 2.0, 5.0) if ratio < 300 else (1.0,))
+    axis.set_major_locator(locator if ratio > LOG_RATIO else MaxNLocator(5, steps=[1, 2, 5, 10]))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_locator(NullLocator())

@@ -1,17 +1,29 @@
-"""Tables, plots and pictures of every run below a folder: `python -m analysis.report FOLDER`."""
+"""Everything about the runs below a folder, as files and as one page.
+
+`python -m analysis.report FOLDER`
+"""
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+from tqdm import tqdm
+
+from analysis.claim_tables import claims_table
+from analysis.dimensions_plot import write_dimensions_figure
+from analysis.exploration import exploration_table
+from analysis.exploration_plots import write_exploration_figures
 from analysis.latex import to_latex
-from analysis.methods import differing_fields, methods_in_order, name_methods
+from analysis.methods import differing_fields, methods_in_order, name_methods, title
+from analysis.page import PageContents, write_page
 from analysis.pictures import write_comparisons
 from analysis.plots import method_styles, write_error_curves
+from analysis.provenance import provenance_frame
 from analysis.runs import SETS, Run, check_comparable, comparison_warnings, find_runs
 from analysis.summary import REFERENCE_NOISE, Comparison, Summary, compare, summarise, to_frame
 from analysis.tables import (
@@ -23,6 +35,7 @@ from analysis.tables import (
     to_terminal,
     worst_table,
 )
+from analysis.verdicts import judge
 
 
 @dataclass(frozen=True)
@@ -35,7 +48,7 @@ class Report:
 
 
 def write_report(folder: Path, output: Path) -> Report:
-    """Reads every run below `folder` and writes tables, plots and pictures into `output`.
+    """Reads every run below `folder` and writes the page, tables, plots, pictures into `output`.
 
     Raises ValueError where there is no run or the runs cannot be compared; nothing is written
     then.
@@ -44,40 +57,74 @@ def write_report(folder: Path, output: Path) -> Report:
     runs = name_methods(runs)
     check_comparable(runs)
     doubts = comparison_warnings(runs)
-    summaries = summarise(runs)
-    comparisons = compare(summaries)
-    output.mkdir(parents=True, exist_ok=True)
-    files = _write_tables(runs, summaries, comparisons, doubts, output)
-    files += write_error_curves(runs, method_styles(runs), output)
-    overviews, missing = write_comparisons(runs, output / "pictures")
-    text = _text(runs, summaries, comparisons)
-    return Report(text, files + overviews, [*warnings, *doubts, *missing])
-
-
-def _write_tables(
-    runs: Sequence[Run],
-    summaries: Sequence[Summary],
-    comparisons: Sequence[Comparison],
-    doubts: Sequence[str],
-    output: Path,
-) -> list[Path]:
+    summaries, styles = summarise(runs), method_styles(runs)
+    comparisons, claims = compare(summaries), judge(runs)
     tables = [error_table(summaries), worst_table(summaries), cost_table(summaries)]
     if comparisons:
         tables.append(comparison_table(comparisons))
+    if (found := claims_table(claims)).rows:
+        tables.insert(0, found)
+    output.mkdir(parents=True, exist_ok=True)
+    files = _write_tables(tables, runs, summaries, doubts, output)
+    missing = []
+    for scene in _progress(sorted({run.scene for run in runs}), "figures of scenes"):
+        of_scene = [run for run in runs if run.scene == scene]
+        files += write_error_curves(of_scene, styles, output)
+        pictures, lacking = write_comparisons(of_scene, output / "pictures")
+        files += pictures
+        missing += lacking
+    files += write_dimensions_figure(runs, output)
+    exploration = write_exploration_figures(runs, styles, output)
+    warnings += doubts + missing
+    contents = PageContents(
+        name=folder.resolve().name,
+        runs=runs,
+        summaries=summaries,
+        comparisons=comparisons,
+        claims=claims,
+        styles=styles,
+        notes=_notes(runs),
+        warnings=warnings,
+        exploration_table=exploration_table(runs),
+        exploration_files=exploration,
+    )
+    page = output / "index.html"
+    write_page(contents, page, lambda parts: _progress(parts, "page"))
+    text = _text(runs, summaries, comparisons, found)
+    return Report(text, [page, *files, *exploration], warnings)
+
+
+def _progress(parts: Iterable[Any], what: str) -> Iterable[Any]:
+    """The parts under a progress bar, where someone looks."""
+    return tqdm(parts, desc=what, leave=False, disable=None)
+
+
+def _write_tables(
+    tables: Sequence[Table],
+    runs: Sequence[Run],
+    summaries: Sequence[Summary],
+    doubts: Sequence[str],
+    output: Path,
+) -> list[Path]:
     csv, markdown, latex = (output / f"results.{suffix}" for suffix in ("csv", "md", "tex"))
+    provenance = output / "provenance.csv"
     to_frame(summaries).to_csv(csv, index=False)
+    provenance_frame(runs).to_csv(provenance, index=False)
     lines = [*_notes(runs), *(f"Warning: {doubt}" for doubt in doubts)]
     notes = "\n".join(f"- {line}" for line in lines)
     markdown.write_text("\n\n".join([*map(to_markdown, tables), notes]) + "\n")
     latex.write_text("\n\n".join(map(to_latex, tables)) + "\n")
-    return [csv, markdown, latex]
+    return [csv, markdown, latex, provenance]
 
 
 def _text(
-    runs: Sequence[Run], summaries: Sequence[Summary], comparisons: Sequence[Comparison]
+    runs: Sequence[Run],
+    summaries: Sequence[Summary],
+    comparisons: Sequence[Comparison],
+    claims: Table,
 ) -> str:
     """The same tables for the terminal, a set of frames at a time so that they fit its width."""
-    tables: list[Table] = []
+    tables = [claims] if claims.rows else []
     for name in SETS:
         tables += [error_table(summaries, [name]), worst_table(summaries, [name])]
         if comparisons:
@@ -101,7 +148,8 @@ def _notes(runs: Sequence[Run]) -> list[str]:
     for method in methods_in_order(runs):
         label = next(run.label for run in runs if run.method == method)
         if fields:
-            notes.append(f"{method}: " + ", ".join(f"{field} {label[field]}" for field in fields))
+            chosen = ", ".join(f"{field} {label[field]}" for field in fields)
+            notes.append(f"{title(method)}: {chosen}")
     reasons = {run.result["lpips_note"] for run in runs if run.result.get("lpips_note")}
     notes += [f"LPIPS is empty: {reason}" for reason in sorted(reasons)]
     return notes
@@ -112,8 +160,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="python -m analysis.report",
         description="Compares every finished run below FOLDER: results.csv, .md and .tex (mean and "
-        "95 %% interval over seeds), error against run time (.png, .svg), and comparison pictures "
-        "of the hard frames. Runs of different protocols, scene files or references are refused.",
+        "95 %% interval over seeds), error against run time (.png, .svg), comparison pictures of "
+        "the hard frames, and index.html, which has everything, the verdicts on the paper's claims "
+        "and the provenance of the runs in one file. Runs of different protocols, scene files or "
+        "references are refused.",
     )
     parser.add_argument("folder", metavar="FOLDER", type=Path, help="searched for result.json")
     parser.add_argument(

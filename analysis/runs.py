@@ -156,7 +156,8 @@ def check_comparable(runs: Sequence[Run]) -> None:
 def comparison_warnings(runs: Sequence[Run]) -> list[str]:
     """What makes a comparison doubtful without forbidding it, a line each.
 
-    Runs of one scene whose run times are more than 5 % apart, and runs of different machines.
+    Runs of one scene whose run times are more than 5 % apart, runs of which some counted measured
+    costs instead of the wall clock's seconds, and runs of different machines.
     """
     warnings = []
     for scene in sorted({run.scene for run in runs}):
@@ -167,13 +168,22 @@ def comparison_warnings(runs: Sequence[Run]) -> list[str]:
                 f"{scene}: the runs were not given the same time: {times[shortest]:.0f} s in "
                 f"{shortest}, {times[longest]:.0f} s in {longest}"
             )
-    machines: dict[str, Path] = {}
-    for run in runs:
-        machines.setdefault(_machine(run), run.folder)
-    if len(machines) > 1:
-        found = "; ".join(f"{machine} in {folder}" for machine, folder in machines.items())
-        warnings.append(f"the runs come from different machines: {found}")
+    for what, value in (
+        ("were timed by different clocks", _clock),
+        ("come from different machines", _machine),
+    ):
+        first: dict[str, Path] = {}
+        for run in runs:
+            first.setdefault(value(run), run.folder)
+        if len(first) > 1:
+            found = "; ".join(f"{name} in {folder}" for name, folder in first.items())
+            warnings.append(f"the runs {what}: {found}")
     return warnings
+
+
+def _clock(run: Run) -> str:
+    """'wall', or 'model' where run time was counted with measured costs per step."""
+    return run.result.get("clock", "wall")
 
 
 def _machine(run: Run) -> str:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from tabulate import tabulate
 
+from analysis.methods import title as method_title
 from analysis.runs import METRICS, SETS
 from analysis.statistics import Estimate
 from analysis.summary import COSTS, Comparison, Summary
@@ -61,7 +62,7 @@ def comparison_table(comparisons: Sequence[Comparison], sets: Sequence[str] = SE
     rows = tuple(
         (
             Cell(comparison.scene),
-            Cell(f"{comparison.other} / {comparison.baseline}"),
+            Cell(f"{method_title(comparison.other)} / {method_title(comparison.baseline)}"),
             *(Cell(_percent_or_missing(comparison.differences[key])) for key in keys),
         )
         for comparison in comparisons
@@ -90,7 +91,11 @@ def _table(
     rows = []
     for summary in summaries:
         rivals = [s for s in summaries if s.scene == summary.scene and s.is_method]
-        cells = [Cell(summary.scene), Cell(summary.method), Cell(str(len(summary.runs) or ""))]
+        cells = [
+            Cell(summary.scene),
+            Cell(method_title(summary.method)),
+            Cell(str(len(summary.runs) or "")),
+        ]
         for key in keys:
             value = summary.values.get(key)
             best = mark_best and summary.is_method and _is_best(value, key, rivals)

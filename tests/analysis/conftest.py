@@ -133,9 +133,8 @@ def write_pictures(folder: Path, *, quality: float) -> None:
             )
 
 
-@pytest.fixture
-def make_run(tmp_path: Path) -> MakeRun:
-    """Writes one run folder below tmp_path / 'runs'; `change` edits the result before that."""
+def run_maker(root: Path) -> MakeRun:
+    """What `make_run` is, for any folder."""
 
     def make(
         *,
@@ -148,7 +147,7 @@ def make_run(tmp_path: Path) -> MakeRun:
         **label: str,
     ) -> Path:
         name = "_".join([sampler, *label.values()])
-        folder = tmp_path / "runs" / scene / name / f"seed={seed}"
+        folder = root / scene / name / f"seed={seed}"
         folder.mkdir(parents=True)
         result = result_file(
             scene=scene, sampler=sampler, seed=seed, quality=quality, label=label, lpips=lpips
@@ -161,3 +160,75 @@ def make_run(tmp_path: Path) -> MakeRun:
         return folder
 
     return make
+
+
+@pytest.fixture
+def make_run(tmp_path: Path) -> MakeRun:
+    """Writes one run folder below tmp_path / 'runs'; `change` edits the result before that."""
+    return run_maker(tmp_path / "runs")
+
+
+def method_maker(make_run: MakeRun) -> MakeRun:
+    """What `make_method` is, for any `make_run`.
+
+    error: the geometric mean over seeds and frames, for every metric; spread: standard deviation
+    of the logarithm of a factor of its own for every seed and frame; what all methods share (a
+    factor per frame and one per seed) cancels in pairs. The curve falls from 8 times the final
+    error, exponentially, with `rate` per second.
+    """
+
+    def make(
+        method: str,
+        *,
+        scene: str = "living-room",
+        seed: int = 0,
+        error: float = 0.1,
+        spread: float = 0.02,
+        rate: float = 0.01,
+        change: Callable[[dict[str, Any]], None] = lambda _: None,
+        **label: str,
+    ) -> Path:
+        own = np.random.default_rng([seed, *method.encode(), *scene.encode()])
+        shared = np.random.default_rng(seed).normal(scale=0.3, size=6)
+
+        def set_errors(result: dict[str, Any]) -> None:
+            for frame in result["frames"]:
+                factor = math.exp(shared[frame["index"]] + shared[5] + spread * own.normal())
+                frame.update(dict.fromkeys(METRICS, error * factor))
+            change(result)
+
+        folder = make_run(
+            scene=scene,
+            sampler=f"of {method}",
+            seed=seed,
+            change=set_errors,
+            method=method,
+            **label,
+        )
+        keys = [f"{s}_{m}{suffix}" for s in SETS for m in METRICS for suffix in ("", "_worst5")]
+        with (folder / "metrics.csv").open("w", newline="") as stream:
+            writer = csv.writer(stream)
+            writer.writerow(["step", "run_seconds", *keys])
+            for step in range(9):
+                value = error * (1 + 7 * math.exp(-rate * 30 * step))
+                writer.writerow([100 * step, 30.0 * step, *[value] * len(keys)])
+        return folder
+
+    return make
+
+
+@pytest.fixture
+def make_method(make_run: MakeRun) -> MakeRun:
+    """Writes a run of an option of the group `method` whose errors on every frame are known."""
+    return method_maker(make_run)
+
+
+@pytest.fixture(scope="session")
+def makers_below() -> Callable[[Path], tuple[MakeRun, MakeRun]]:
+    """`make_run` and `make_method` below a folder, for what several tests share."""
+
+    def makers(root: Path) -> tuple[MakeRun, MakeRun]:
+        make_run = run_maker(root)
+        return make_run, method_maker(make_run)
+
+    return makers

@@ -3,8 +3,8 @@ from pathlib import Path
 
 import pytest
 
-from analysis.methods import differing_fields, methods_in_order, name_methods
-from analysis.runs import check_comparable, find_runs
+from analysis.methods import differing_fields, methods_in_order, name_methods, title
+from analysis.runs import check_comparable, comparison_warnings, find_runs
 
 
 def methods(folder: Path) -> list[str]:
@@ -54,6 +54,33 @@ def test_what_differs_between_scenes_only_is_not_part_of_the_name(make_run, tmp_
     assert methods(tmp_path) == ["uniform"]
 
 
+def test_options_of_method_are_the_names(make_run, tmp_path) -> None:
+    make_run(sampler="mcmc_metropolis", method="metropolis")
+    make_run(sampler="mcmc_loss_step", method="traced_specular")
+    make_run(sampler="mcmc_loss_step", method="active_exploration")
+    make_run(sampler="uniform", method="uniform_growing", resolution="growing")
+    make_run(sampler="uniform", method="uniform")
+    make_run(sampler="mcmc_release")
+    make_run(scene="chess", sampler="mcmc_loss_step", method="active_exploration", reuse="never")
+    assert methods(tmp_path) == [
+        "uniform",
+        "active_exploration",
+        "metropolis",
+        "uniform_growing",
+        "traced_specular",
+        "mcmc_release",
+    ]
+
+
+def test_a_method_run_in_two_ways_is_two(make_run, tmp_path) -> None:
+    make_run(method="active_exploration", reuse="never")
+    make_run(method="active_exploration", reuse="self_tuning")
+    names = ["active_exploration, never", "active_exploration, self_tuning"]
+    assert methods(tmp_path) == names
+    assert title(names[0]) == "Active Exploration, never"
+    assert title("mcmc_release") == "mcmc_release"
+
+
 def set_value(*path: str, value: object):  # type: ignore[no-untyped-def]
     def change(result: dict) -> None:
         for key in path[:-1]:
@@ -91,6 +118,14 @@ def test_a_seed_counts_once_per_method(make_run, tmp_path) -> None:
     folder = make_run(seed=4, change=set_value("seed", value=3))
     with pytest.raises(ValueError, match=rf"{folder}.*same method \(uniform\).*seed \(3\)"):
         check(tmp_path)
+
+
+def test_two_clocks_in_one_comparison_are_a_doubt(make_run, tmp_path) -> None:
+    wall = make_run(seed=0)  # of before there were two clocks
+    assert comparison_warnings(find_runs(tmp_path)[0]) == []
+    model = make_run(seed=1, change=set_value("clock", value="model"))
+    (warning,) = comparison_warnings(find_runs(tmp_path)[0])
+    assert f"different clocks: wall in {wall}; model in {model}" in warning
 
 
 def test_other_schema_version_is_refused(make_run, tmp_path) -> None:

@@ -1,0 +1,170 @@
+"""What the paper claims, as data: statement, source, and the comparisons that test it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+SEVEN_SCENES = (
+    "sphere-caustic",
+    "living-room",
+    "bedroom",
+    "veach-door",
+    "bathroom",
+    "spaceship",
+    "veach-egg",
+)
+SALONS = ("salon-5", "salon-7", "salon-9", "salon-10", "salon-25")
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """`better` is claimed to have less error than `worse` after the same time, on every scene.
+
+    better, worse: options of the configuration group `method`. decides: whether the claim's
+    verdict depends on it; otherwise it is shown beside the claim.
+    """
+
+    scenes: tuple[str, ...]
+    better: str
+    worse: str
+    decides: bool = True
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One claim of the paper.
+
+    id: name of the sweep that tests it; title: a few words; statement: what the paper says, in our
+    words; source: where it says so; test: what we measure and when we call it reproduced, where
+    the comparisons alone do not say it; command: what runs it, None where it cannot be run yet.
+    """
+
+    id: str
+    title: str
+    statement: str
+    source: str
+    comparisons: tuple[Comparison, ...] = ()
+    test: str = ""
+    built: bool = True
+
+    @property
+    def command(self) -> str | None:
+        return f"python -m ngi.train -m +sweeps={self.id} budget=small" if self.built else None
+
+
+CLAIMS = (
+    Claim(
+        id="same_time",
+        title="Active Exploration against uniform sampling",
+        statement="After the same training time exploration gives sharper reflections, caustics "
+        "and shadows and less error than uniform sampling with the same sample reuse, which ends "
+        "at a low quality that more training does not improve.",
+        source="Sec. 7.2.1; Tab. 3; Fig. 11, 13",
+        comparisons=(Comparison(SEVEN_SCENES, "active_exploration", "uniform"),),
+    ),
+    Claim(
+        id="preconditioning",
+        title="Position preconditioning",
+        statement="Passing the position alone through the first layer greatly improves the "
+        "result: the network learns to ignore the table's texture where it shades the caustic.",
+        source="Sec. 4.2, 7.3; Tab. 5; Fig. 16",
+        comparisons=(Comparison(("living-room",), "active_exploration", "no_preconditioning"),),
+    ),
+    Claim(
+        id="resolution",
+        title="Growing resolution",
+        statement="A resolution that grows while training lets exploration resolve reflections "
+        "and shadows; under uniform sampling it makes the result worse.",
+        source="Sec. 6.2, 7.3; Tab. 6; Fig. 7",
+        comparisons=(
+            Comparison(("living-room",), "active_exploration", "constant_resolution"),
+            Comparison(("living-room",), "uniform", "uniform_growing"),
+            Comparison(("living-room",), "active_exploration", "uniform", decides=False),
+        ),
+    ),
+    Claim(
+        id="target_function",
+        title="Target function: loss times step",
+        statement="With the loss alone as the chains' target, training gets stuck in states that "
+        "cannot be improved any more, and the result is blurrier than with loss times the norm of "
+        "the Adam step.",
+        source="Sec. 5.1, 7.3; Tab. 7; Fig. 17",
+        comparisons=(
+            Comparison(("living-room",), "active_exploration", "loss_target"),
+            Comparison(
+                ("living-room",), "output_gradient_target", "active_exploration", decides=False
+            ),
+        ),
+    ),
+    Claim(
+        id="acceptance",
+        title="Greedy acceptance",
+        statement="The acceptance rule of Metropolis and Hastings does not converge to the "
+        "target distribution before that has changed; accepting only what is better does.",
+        source="Sec. 5.1; Eq. 3, 4",
+        comparisons=(
+            Comparison(("sphere-caustic", "living-room"), "active_exploration", "metropolis"),
+        ),
+    ),
+    Claim(
+        id="histogram",
+        title="Samples follow the target function",
+        statement="Without reuse, in a room with a mirror, the histogram of the chains' samples "
+        "starts to follow the target function after a burn-in, and the figure's reflection "
+        "appears much sooner than with uniform sampling.",
+        source="Sec. 5.1; Fig. 6",
+        comparisons=(Comparison(("mirror",), "active_exploration", "uniform"),),
+        test="The distance between histogram and target map falls from the first to the last "
+        "third of the run, for greedy acceptance and for Metropolis, by more than for uniform "
+        "sampling.",
+    ),
+    Claim(
+        id="dimensions",
+        title="More variables, more benefit",
+        statement="On Salon the benefit of exploration over uniform sampling is small for 5 "
+        "variables and in general grows with their number and complexity; albedos add less than "
+        "a moving light.",
+        source="Sec. 7.3; Fig. 14",
+        comparisons=tuple(
+            Comparison((salon,), "active_exploration", "uniform", decides=False) for salon in SALONS
+        ),
+        test="The log ratio of the errors (exploration over uniform) falls with the logarithm of "
+        "the number of variables.",
+    ),
+    Claim(
+        id="specular",
+        title="Training time and traced specular bounces",
+        statement="Quality grows with the hours of training; with specular bounces traced instead "
+        "of learnt, results are acceptable after half an hour.",
+        source="Sec. 7.1; Fig. 9, 10",
+        comparisons=(Comparison(("bedroom",), "traced_specular", "active_exploration"),),
+        test="Traced bounces give less error after the same time, and without them the error "
+        "still falls in the second half of the run.",
+    ),
+    Claim(
+        id="cnsr",
+        title="Against Compositional Neural Scene Representations",
+        statement="At the same quality training takes a fraction of CNSR's time; after the same "
+        "time the error is lower.",
+        source="Sec. 7.2.2; Fig. 12",
+        built=False,
+    ),
+    Claim(
+        id="anf",
+        title="Against the Affinity of Neural Features denoiser",
+        statement="At the same frame time the error is lower than that of path tracing with the "
+        "denoiser ANF.",
+        source="Sec. 7.2.3; Tab. 4; Fig. 15",
+        built=False,
+    ),
+    Claim(
+        id="chess",
+        title="128 variables",
+        statement="With 128 variables results are still plausible, with some shadows and "
+        "highlights missing.",
+        source="Sec. 8; Fig. 18",
+        comparisons=(Comparison(("chess",), "active_exploration", "uniform", decides=False),),
+        test="Plausible: after the same time DSSIM and LPIPS on the hard frames are not higher "
+        "than those of the worst of the seven scenes, and lower than at the first evaluation.",
+    ),
+)

@@ -1,0 +1,83 @@
+"""How much exploration gains over time in scenes of more and more variables (Fig. 14, Salon)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from analysis.claims import SALONS
+from analysis.curves import error_curve
+from analysis.pairs import pair_runs
+from analysis.plots import STYLE, draw_band, new_figure, save_figure
+from analysis.runs import METRICS, Run
+from analysis.tables import TITLES
+
+BETTER, WORSE = "active_exploration", "uniform"
+
+
+def write_dimensions_figure(runs: Sequence[Run], folder: Path) -> list[Path]:
+    """Writes `dimensions.png` and `.svg`; nothing where no scene has both methods."""
+    if not salons_of_both(runs):
+        return []
+    with matplotlib.rc_context(STYLE):
+        figure = dimensions_figure(runs, METRICS)
+        figure.suptitle(
+            f"error of {WORSE} minus error of {BETTER}, hard frames (band: 95 % interval)",
+            fontsize=10,
+        )
+        return save_figure(figure, folder, "dimensions")
+
+
+def dimensions_figure(runs: Sequence[Run], metrics: Sequence[str]) -> Figure:
+    """A panel per metric with a curve per scene; above zero exploration has less error."""
+    figure = new_figure(3.3 * len(metrics), 3.0)
+    panels = figure.subplots(1, len(metrics), squeeze=False)[0]
+    for axes, metric in zip(panels, metrics, strict=True):
+        _draw(axes, runs, f"hard_{metric}")
+        axes.set_title(f"{TITLES[metric]}: difference", fontsize=9, loc="left")
+        axes.set_xlabel("run time in seconds")
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False)
+    return figure
+
+
+def salons_of_both(runs: Sequence[Run]) -> list[str]:
+    """The Salon's variants in which both methods have runs of the same seed."""
+    return [salon for salon in SALONS if pair_runs(runs, salon, BETTER, WORSE)]
+
+
+def _draw(axes: Axes, runs: Sequence[Run], key: str) -> None:
+    salons = salons_of_both(runs)
+    colours = matplotlib.colormaps["viridis"](np.linspace(0, 0.85, len(salons)))
+    for salon, colour in zip(salons, colours, strict=True):
+        pairs = pair_runs(runs, salon, BETTER, WORSE)
+        curve = error_curve([_difference(pair.better, pair.worse, key) for pair in pairs], key)
+        if curve is not None:
+            draw_band(axes, curve, label=salon, color=matplotlib.colors.to_hex(colour))
+    axes.axhline(0, color="#666666", linewidth=0.8)
+
+
+def _difference(better: Run, worse: Run, key: str) -> Run:
+    """The better run with the worse one's error minus its own as its history.
+
+    The errors are taken at the better run's evaluations, the worse one's interpolated linearly;
+    the evaluations outside the worse run's time are left out.
+    """
+    ours, theirs = (
+        run.history[["run_seconds", key]].dropna().to_numpy(dtype=float)
+        if key in run.history
+        else np.empty((0, 2))
+        for run in (better, worse)
+    )
+    if not len(ours) or not len(theirs):
+        return replace(better, history=pd.DataFrame({"run_seconds": [], key: []}))
+    ours = ours[(ours[:, 0] >= theirs[0, 0]) & (ours[:, 0] <= theirs[-1, 0])]
+    difference = np.interp(ours[:, 0], theirs[:, 0], theirs[:, 1]) - ours[:, 1]
+    return replace(better, history=pd.DataFrame({"run_seconds": ours[:, 0], key: difference}))

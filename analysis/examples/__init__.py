@@ -1,0 +1,1 @@
+"""Notebook-style examples of the library."""

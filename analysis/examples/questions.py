@@ -1,0 +1,48 @@
+"""Three questions to a folder of runs: `python -m analysis.examples.questions FOLDER`.
+
+Cells begin with `# %%`: an editor that knows them (VS Code, PyCharm, Spyder, Jupytext) shows this
+file as a notebook.
+"""
+
+# %%
+import sys
+
+import numpy as np
+import pandas as pd
+
+from analysis import load_runs
+
+results = load_runs(sys.argv[1] if len(sys.argv) > 1 else "outputs/demo")
+evaluations, frames = results.evaluations, results.frames
+means = evaluations.query("statistic == 'mean' and set == 'hard' and metric == 'mape'")
+
+# %% Which method has the lowest error after the same time?
+# The longest time that all runs of a scene reached; MAPE on hard frames, mean over the seeds.
+runs = means.groupby(["scene", "method", "seed"])
+ends = runs["run_seconds"].max().groupby("scene").min()
+
+
+def error_at(history: pd.DataFrame, seconds: float) -> float:
+    history = history.sort_values("run_seconds")
+    return float(np.interp(seconds, history["run_seconds"], history["value"]))
+
+
+errors = runs[["run_seconds", "value"]].apply(lambda run: error_at(run, ends[run.name[0]]))
+print("\nMAPE on hard frames after the same time:")
+print(errors.groupby(["scene", "method"]).agg(["mean", "std", "count"]).round(4).to_string())
+
+# %% How long does each method take to reach an error?
+# For every scene the error that its worst method ends with; the first evaluation at or below it.
+targets = errors.groupby(["scene", "method"]).mean().groupby("scene").max()
+reached = means[means["value"] <= means["scene"].map(targets)]
+seconds = reached.groupby(["scene", "method", "seed"])["run_seconds"].min()
+print("\nSeconds to the error that the scene's worst method ends with:")
+print(seconds.groupby(["scene", "method"]).agg(["mean", "count"]).round(1).to_string())
+
+# %% Which frames are hardest, and which method does best there?
+mape = frames.query("set == 'hard' and metric == 'mape'")
+table = mape.pivot_table(values="value", index=["scene", "frame"], columns="method")
+hardest = table.assign(best=table.idxmin(axis=1), hardness=table.min(axis=1))
+hardest = hardest.sort_values("hardness", ascending=False).groupby("scene").head(3).sort_index()
+print("\nThe three hardest frames of each scene, MAPE:")
+print(hardest.drop(columns="hardness").round(4).to_string())

@@ -1,0 +1,168 @@
+"""What claims are judged by that is no comparison of two methods on one scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+
+from analysis.claims import SALONS, SEVEN_SCENES
+from analysis.evidence import EQUIVALENCE, Finding, Verdict, decide
+from analysis.pairs import log_error, log_errors, log_ratios, pair_runs, shared_metrics
+from analysis.runs import Run
+from analysis.speedup import log_error_series
+from analysis.statistics import bootstrap_interval
+from analysis.target_map import histogram_distances
+
+METHOD = "active_exploration"
+
+
+def benefit_against_dimensions(runs: Sequence[Run]) -> list[Finding]:
+    """Slope of the log ratio exploration / uniform on hard frames over log2 of the variables.
+
+    Least squares over the Salons that were run; every Salon's seeds and frames are resampled.
+    Inconclusive until all five were run.
+    """
+    dimensions, samples = [], []
+    for salon in SALONS:
+        if pairs := pair_runs(runs, salon, METHOD, "uniform"):
+            both = [run for pair in pairs for run in (pair.better, pair.worse)]
+            ratios = log_ratios(pairs, "hard", shared_metrics(both, "hard"))
+            dimensions.append(np.log2(int(salon.removeprefix("salon-"))))
+            samples.append(ratios)
+    if len(dimensions) < 2:
+        return []
+    centred = np.array(dimensions) - np.mean(dimensions)
+    weights = centred / (centred**2).sum()
+    text = "change of the error ratio exploration / uniform per doubling of the variables, in %"
+    finding = _percent_finding(text, weights, samples, equivalence=EQUIVALENCE)
+    complete = len(samples) == len(SALONS)
+    return [finding if complete else replace(finding, verdict=Verdict.INCONCLUSIVE)]
+
+
+def histogram_follows_target(runs: Sequence[Run]) -> list[Finding]:
+    """Change of the distance between the samples' histogram and the target map over a run.
+
+    Mean of the last third of the run less that of the first third, per seed; of the chains alone,
+    and beyond what uniform sampling shows while the target map changes.
+    """
+    without_reuse = [
+        replace(run, method=run.label["method"])
+        for run in runs
+        if run.scene == "mirror" and run.label["reuse"] == "never" and run.label.get("method")
+    ]
+    distances = histogram_distances(without_reuse)
+    if distances.empty:
+        return []
+    by_run = ["seed", "method"]
+    ends = distances.groupby(by_run)["run_seconds"].transform("max")
+    early = distances[distances["run_seconds"] <= ends / 3].groupby(by_run)["distance"].mean()
+    late = distances[distances["run_seconds"] > 2 * ends / 3].groupby(by_run)["distance"].mean()
+    changes = (late - early).unstack("method").reindex(columns=[METHOD, "metropolis", "uniform"])
+    findings = []
+    for method in (METHOD, "metropolis"):
+        text = f"distance of histogram and target map under {method}, last less first third"
+        findings.append(_finding(text, changes[method].dropna()))
+        beyond = changes[method] - changes["uniform"]
+        findings.append(_finding(f"{text}, beyond uniform's change", beyond.dropna()))
+    return [finding for finding in findings if finding is not None]
+
+
+def error_still_falls(runs: Sequence[Run]) -> list[Finding]:
+    """Change of the error (geometric mean of the hard metrics) in the second half of the run."""
+    of_scene = _runs_of(runs, "bedroom")
+    changes = []
+    for series in log_error_series(of_scene):
+        if len(series) > 1:
+            seconds, errors = series.T
+            changes.append(errors[-1] - np.interp(seconds[-1] / 2, seconds, errors))
+    if not changes:
+        return []
+    text = "change of the hard frames' error in the second half of the run, in %"
+    return [_percent_finding(text, [1.0], [np.array(changes)[:, None]], equivalence=EQUIVALENCE)]
+
+
+def many_variables_are_plausible(runs: Sequence[Run]) -> list[Finding]:
+    """Chess against the worst of the seven scenes, and against its own first evaluation."""
+    chess = _runs_of(runs, "chess")
+    if not chess:
+        return []
+    findings = []
+    perceived = [m for m in ("dssim", "lpips") if m in shared_metrics(chess, "hard")]
+    scenes = {scene: _log_errors(_runs_of(runs, scene), perceived) for scene in SEVEN_SCENES}
+    known = {scene: errors for scene, errors in scenes.items() if errors.size}
+    if known:
+        worst = max(known, key=lambda scene: float(known[scene].mean()))
+        text = f"DSSIM and LPIPS of chess against the worst of {len(known)} scenes ({worst}), in %"
+        samples = [_log_errors(chess, perceived), known[worst]]
+        findings.append(_percent_finding(text, [1.0, -1.0], samples))
+    gains = np.array(
+        [_log_change(run, [f"hard_{metric}" for metric in perceived]) for run in chess]
+    )
+    text = "DSSIM and LPIPS of chess against its first evaluation, in %"
+    findings.append(_percent_finding(text, [1.0], [gains[:, None]]))
+    return findings
+
+
+def _runs_of(runs: Sequence[Run], scene: str) -> list[Run]:
+    return [r for r in runs if r.scene == scene and r.label.get("method") == METHOD]
+
+
+def _log_errors(runs: Sequence[Run], metrics: Sequence[str]) -> np.ndarray:
+    """[runs, hard frames], mean over the metrics; empty without runs or where one lacks any."""
+    if not runs or not set(metrics) <= set(shared_metrics(runs, "hard")):
+        return np.empty((0, 0))
+    return np.array([list(log_errors(run, "hard", metrics).values()) for run in runs])
+
+
+def _log_change(run: Run, keys: Sequence[str]) -> float:
+    """From the first to the last evaluation, mean over the columns of metrics.csv."""
+    first, last = run.history[list(keys)].iloc[[0, -1]].to_numpy(dtype=float)
+    return float(np.mean([log_error(b) - log_error(a) for a, b in zip(first, last, strict=True)]))
+
+
+def _finding(text: str, values: pd.Series) -> Finding | None:
+    """The mean of a value per seed, claimed to be negative; None without any."""
+    if values.empty:
+        return None
+    low = high = None
+    mean = float(values.mean())
+    if len(values) > 1:
+        low, high = bootstrap_interval(mean, [values.to_numpy()])
+    return Finding(text, mean, low, high, decide(low, high))
+
+
+def _percent_finding(
+    text: str,
+    weights: Sequence[float] | np.ndarray,
+    samples: Sequence[np.ndarray],
+    *,
+    equivalence: float = 0.0,
+) -> Finding:
+    """100 · (exp(weighted sum of the means) - 1), claimed to be negative.
+
+    samples: [seeds, frames] each, independent of each other; no interval where one has one seed.
+    """
+    centre = float(sum(w * values.mean() for w, values in zip(weights, samples, strict=True)))
+    low = high = None
+    if np.isfinite(centre) and all(len(values) > 1 for values in samples):
+        levels = [
+            weight * values.mean(axis=axis)
+            for weight, values in zip(weights, samples, strict=True)
+            for axis in (0, 1)
+            if values.shape[1 - axis] > 1
+        ]
+        low, high = (100 * float(np.expm1(end)) for end in bootstrap_interval(centre, levels))
+    value = 100 * float(np.expm1(centre))
+    return Finding(text, value, low, high, decide(low, high, equivalence=equivalence))
+
+
+FINDINGS: Mapping[str, Callable[[Sequence[Run]], list[Finding]]] = {
+    "histogram": histogram_follows_target,
+    "dimensions": benefit_against_dimensions,
+    "specular": error_still_falls,
+    "chess": many_variables_are_plausible,
+}
+"""By a claim's id; every finding decides."""

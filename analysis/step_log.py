@@ -1,0 +1,35 @@
+"""What a run logged at every training step, brought to few points that seeds share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from analysis.runs import Run
+
+
+def read_steps(run: Run) -> pd.DataFrame:
+    """A row per training step. Raises ValueError where steps.csv is missing or damaged."""
+    path = run.folder / "steps.csv"
+    try:
+        return pd.read_csv(path)
+    except (OSError, ValueError) as error:
+        raise ValueError(f"{path} cannot be read ({error}); move the run away") from error
+
+
+def mean_over_time(
+    logs: Sequence[pd.DataFrame], column: str, *, points: int = 40
+) -> tuple[np.ndarray, np.ndarray]:
+    """Run time in seconds [points] and the mean of a column, [runs, points], in equal intervals.
+
+    The intervals share the run time that all runs cover. NaN where a run logged nothing.
+    """
+    end = min(log["run_seconds"].max() for log in logs)
+    edges = np.linspace(0, end, points + 1)
+    values = []
+    for log in logs:
+        interval = pd.cut(log["run_seconds"], list(edges), labels=False)
+        values.append(log[column].groupby(interval).mean().reindex(range(points)).to_numpy(float))
+    return (edges[1:] + edges[:-1]) / 2, np.stack(values)

@@ -1,0 +1,173 @@
+"""Where chains go against where their target density is high, in scenes of two variables.
+
+The paper compares both by eye (Fig. 6); here they get a distance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isqrt
+
+import numpy as np
+import pandas as pd
+from scipy.spatial.distance import jensenshannon
+
+from analysis.chain_trace import read_chain_trace, read_records
+from analysis.runs import Run
+
+SIMULATIONS = 200
+"""Of an equal number of independent states, for the distance that noise alone causes."""
+
+PLANES = {"scene": [0, 1], "patch": [2, 3]}
+"""The coordinates of a state, (v, patch position), that span each."""
+
+PATCHES_PER_CELL = 32
+"""Of the map, where the patch position is divided into cells."""
+
+COLUMNS = (
+    "scene",
+    "method",
+    "seed",
+    "step",
+    "run_seconds",
+    "states",
+    "distance",
+    "floor",
+    "uniform_distance",
+    "excess",
+    "excess_error",
+)
+
+
+@dataclass(frozen=True)
+class Window:
+    """The time between two evaluations, of which the later one measured the target density.
+
+    step, run_seconds: at its end
+    density: [g, g] target density at its end; sums up to 1
+    counts: [n, g, g] how often each of n chains stood in a cell, after every generated batch
+    The first index is the cell along the first scene variable.
+    """
+
+    step: int
+    run_seconds: float
+    density: np.ndarray
+    counts: np.ndarray
+
+
+def windows(run: Run, plane: str = "scene") -> list[Window]:
+    """One per evaluation; none for a run without a map or a trace.
+
+    plane: 'scene' for the two scene variables, on the grid of the map, or 'patch' for the patch
+        position, on a grid whose cells hold `PATCHES_PER_CELL` of the map's patches on average
+    """
+    maps = read_records(run.folder / "target_map.bin")
+    trace = read_chain_trace(run)
+    if maps is None or trace is None or trace.state is None:
+        return []
+    patches = maps["target"][0].size
+    cells = maps["target"].shape[1] if plane == "scene" else isqrt(patches // PATCHES_PER_CELL)
+    found, begin = [], 0
+    for record in maps:
+        end = int(np.searchsorted(trace.step, record["step"], side="right"))
+        states = trace.state[begin:end].swapaxes(0, 1)  # [n, T, 4]
+        if states.size:
+            found.append(
+                Window(
+                    step=int(record["step"]),
+                    run_seconds=float(record["run_seconds"]),
+                    density=_density(record, plane, cells),
+                    counts=np.stack([_histogram(_coordinates(s, plane), cells) for s in states]),
+                )
+            )
+        begin = end
+    return found
+
+
+def _coordinates(states: np.ndarray, plane: str) -> np.ndarray:
+    """[n, 2] the two coordinates of states [..., 4] that span the plane."""
+    return states.reshape(-1, 4)[:, PLANES[plane]]
+
+
+def _density(record: np.void, plane: str, cells: int) -> np.ndarray:
+    """[cells, cells] mean target density of the map's patches in each cell, summing up to 1."""
+    states, target = _coordinates(record["state"], plane), record["target"].ravel()
+    mean = _histogram(states, cells, target) / np.maximum(_histogram(states, cells), 1)
+    return mean / mean.sum()
+
+
+def _histogram(states: np.ndarray, cells: int, weights: np.ndarray | None = None) -> np.ndarray:
+    edges = [np.linspace(0, 1, cells + 1)] * 2
+    return np.histogram2d(states[:, 0], states[:, 1], bins=edges, weights=weights)[0]
+
+
+def histogram_distances(runs: Sequence[Run], plane: str = "scene") -> pd.DataFrame:
+    """A row per run and window: how far the chains' histogram is from the target density.
+
+    plane: 'scene' for the two scene variables or 'patch' for the patch position
+
+    distance: Jensen-Shannon distance with logarithms to base 2: 0 for equal distributions, 1 for
+        those that share no cell
+    states: how many the histogram holds
+    floor: expected distance of as many independent states drawn from the target density itself.
+        Those of a chain are correlated, so that even one that follows its target stays above it.
+    uniform_distance: expected distance of as many uniformly drawn independent states
+    excess: squared L2 distance from the target density, without what the number of states and
+        their correlation add, by that of the uniform density: 0 for chains that follow the target,
+        1 for uniform sampling, more for chains that are farther from it than that. Unlike the
+        distance it can be compared between samplers and over time.
+    excess_error: its standard error; large where the density is nearly uniform
+    """
+    rows = []
+    for run in runs:
+        for window in windows(run, plane):
+            counts = window.counts.sum(axis=0)
+            states = int(counts.sum())
+            even = np.full_like(window.density, 1 / window.density.size)
+            rows.append(
+                (
+                    *(run.scene, run.method, run.seed, window.step, window.run_seconds, states),
+                    float(_distances(counts, window.density)),
+                    _expected_distance(window.density, window.density, states),
+                    _expected_distance(even, window.density, states),
+                    *_excess(window),
+                )
+            )
+    return pd.DataFrame(rows, columns=list(COLUMNS))
+
+
+def _distances(counts: np.ndarray, density: np.ndarray) -> np.ndarray:
+    """Of histograms [..., g, g] from a density [g, g]; [...]."""
+    flat = counts.reshape(*counts.shape[:-2], -1)
+    return np.asarray(jensenshannon(flat, density.reshape(*[1] * (flat.ndim - 1), -1), 2, axis=-1))
+
+
+def _expected_distance(drawn_from: np.ndarray, density: np.ndarray, states: int) -> float:
+    """Mean distance from `density` of histograms of independent states."""
+    generator = np.random.default_rng(0)
+    counts = generator.multinomial(states, drawn_from.ravel(), size=SIMULATIONS)
+    return float(_distances(counts.reshape(-1, *density.shape), density).mean())
+
+
+def _excess(window: Window) -> tuple[float, float]:
+    """Squared distance of the chains' density from the target's, by that of a uniform density.
+
+    With its standard error (jackknife over chains). Products of two different chains are averaged,
+    which know nothing of each other, so that neither the number of a chain's states nor their
+    correlation adds to it.
+    """
+    chains = len(window.counts)
+    if chains < 3:
+        return np.nan, np.nan
+    target = (window.density * window.density.size).ravel()
+    counts = window.counts.reshape(chains, -1)
+    difference = counts / counts.mean(axis=1, keepdims=True) - target
+    own = np.square(difference).sum(axis=1)
+    total = difference.sum(axis=0)
+    squared = (total @ total - own.sum()) / (chains * (chains - 1))
+    others = np.square(total - difference).sum(axis=1) - (own.sum() - own)
+    without_one = others / ((chains - 1) * (chains - 2))
+    error = np.sqrt((chains - 1) * without_one.var())
+    uniform = np.square(1 - target).sum()
+    return (float(squared / uniform), float(error / uniform)) if uniform > 0 else (np.nan, np.nan)

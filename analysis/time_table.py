@@ -1,0 +1,38 @@
+"""Time to equal error as a table: every method against the baseline, on every scene."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from analysis.claim_tables import format_time_ratio
+from analysis.methods import methods_in_order, title
+from analysis.pairs import Pair
+from analysis.runs import Run
+from analysis.speedup import time_ratio
+from analysis.tables import Cell, Table
+
+
+def time_table(runs: Sequence[Run]) -> Table:
+    """How many times as long the baseline takes to the error that both reach; above 1 it is slower.
+
+    The baseline of a scene is its first method, uniform sampling where that was run; scenes of one
+    method have no row.
+    """
+    rows = []
+    for scene in sorted({run.scene for run in runs}):
+        of_scene = [run for run in runs if run.scene == scene]
+        baseline, *others = methods_in_order(of_scene)
+        for method in others:
+            pairs = _pair(of_scene, method, baseline)
+            if pairs:
+                ratio = format_time_ratio(time_ratio(pairs))
+                rows.append((Cell(scene), Cell(title(method)), Cell(title(baseline)), Cell(ratio)))
+    columns = ("scene", "method", "baseline", "baseline's time / method's time")
+    return Table("Run time to equal error", columns, tuple(rows), 3)
+
+
+def _pair(runs: Sequence[Run], better: str, worse: str) -> list[Pair]:
+    ours, theirs = (
+        {run.seed: run for run in runs if run.method == method} for method in (better, worse)
+    )
+    return [Pair(ours[seed], theirs[seed]) for seed in sorted(ours.keys() & theirs.keys())]

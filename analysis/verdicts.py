@@ -1,0 +1,99 @@
+"""Which of the paper's claims the runs reproduce: `judge(runs)`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from analysis.claims import CLAIMS, Claim, Comparison
+from analysis.effects import compare_on_scene, pool
+from analysis.evidence import (
+    ALL_SCENES,
+    MORE_THAN_MOST_SEEDS,
+    ComparisonResult,
+    Effect,
+    Finding,
+    TimeRatio,
+    Verdict,
+    all_of,
+)
+from analysis.findings import FINDINGS
+from analysis.runs import Run
+from analysis.sentences import in_words
+
+__all__ = [
+    "ALL_SCENES",
+    "MORE_THAN_MOST_SEEDS",
+    "ClaimResult",
+    "ComparisonResult",
+    "Effect",
+    "Finding",
+    "TimeRatio",
+    "Verdict",
+    "judge",
+]
+
+
+@dataclass(frozen=True)
+class ClaimResult:
+    """A claim, the evidence, and what to make of it.
+
+    comparisons: per scene, then over all scenes where there are several; sentence: the verdict in
+    words; for a claim without runs both tuples are empty.
+    """
+
+    claim: Claim
+    comparisons: tuple[ComparisonResult, ...]
+    findings: tuple[Finding, ...]
+    verdict: Verdict
+    sentence: str
+
+
+def judge(runs: Sequence[Run]) -> list[ClaimResult]:
+    """Every claim of the paper, in the paper's order, with the evidence that these runs give.
+
+    A claim is reproduced where every comparison and finding that decides it is; not reproduced
+    where one of them is not; else, or where one or one of its scenes is missing, inconclusive.
+    Each comparison is decided by one number chosen beforehand: the error ratio on the hard frames
+    (the paper's measure), geometric mean over the metrics that all its runs have, so that no
+    metric can be picked afterwards. Its 95 % interval over seeds and frames says how
+    (`analysis.evidence.decide`).
+    """
+    return [_judge(claim, runs) for claim in CLAIMS]
+
+
+def _judge(claim: Claim, runs: Sequence[Run]) -> ClaimResult:
+    by_comparison = [_compare(comparison, runs) for comparison in claim.comparisons]
+    comparisons = tuple(result for results in by_comparison for result in results)
+    findings = tuple(FINDINGS[claim.id](runs)) if claim.id in FINDINGS else ()
+    deciding = [
+        _of_all_scenes(comparison, results)
+        for comparison, results in zip(claim.comparisons, by_comparison, strict=True)
+        if comparison.decides
+    ]
+    if claim.id in FINDINGS:
+        deciding += [finding.verdict for finding in findings] or [Verdict.INCONCLUSIVE]
+    if comparisons or findings:
+        verdict = all_of(deciding)
+    else:
+        verdict = Verdict.NOT_RUN if claim.built else Verdict.NOT_BUILT
+    sentence = in_words(claim, verdict, by_comparison, findings)
+    return ClaimResult(claim, comparisons, findings, verdict, sentence)
+
+
+def _of_all_scenes(comparison: Comparison, results: Sequence[ComparisonResult]) -> Verdict:
+    """The last result's verdict (over all scenes or the only one), once every scene was run."""
+    complete = {result.scene for result in results} >= set(comparison.scenes)
+    return results[-1].verdict if complete else Verdict.INCONCLUSIVE
+
+
+def _compare(comparison: Comparison, runs: Sequence[Run]) -> list[ComparisonResult]:
+    """Per scene that was run, and where there are several, over all of them."""
+    found = [
+        compare_on_scene(runs, scene, comparison.better, comparison.worse)
+        for scene in comparison.scenes
+    ]
+    results = [result for result in found if result is not None]
+    if len(results) > 1:
+        results.append(pool(results))
+    return [replace(result, decides=comparison.decides) for result in results]

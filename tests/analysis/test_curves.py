@@ -1,0 +1,43 @@
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+
+from analysis.curves import error_curve
+from analysis.runs import Run
+
+
+def run(*values: float) -> Run:
+    seconds = [10.0 * (index + 1) for index in range(len(values))]
+    return Run(None, {}, pd.DataFrame({"run_seconds": seconds, "hard_mape": values}))  # type: ignore[arg-type]
+
+
+def test_band_is_the_interval_of_the_mean() -> None:
+    curve = error_curve([run(1.00), run(1.02), run(0.98)], "hard_mape")
+    assert curve is not None
+    # With so little spread the interval of the logarithm is that of the value.
+    low, high = stats.t.interval(0.95, 2, loc=1.0, scale=stats.sem([1.0, 1.02, 0.98]))
+    assert curve.mean.tolist() == [pytest.approx(1.0)]
+    assert (curve.low[0], curve.high[0]) == (
+        pytest.approx(low, rel=2e-3),
+        pytest.approx(high, rel=2e-3),
+    )
+
+
+def test_band_stays_above_zero() -> None:
+    curve = error_curve([run(1.0), run(0.01), run(0.01)], "hard_mape")
+    assert curve is not None
+    assert 0 < curve.low[0] < curve.mean[0] < curve.high[0]
+    assert math.log(curve.mean[0] / curve.low[0]) == pytest.approx(
+        math.log(curve.high[0] / curve.mean[0])
+    )
+
+
+def test_one_seed_and_a_mean_of_zero_have_no_band() -> None:
+    for runs in ([run(0.3, 0.2)], [run(0.0), run(0.0)]):
+        curve = error_curve(runs, "hard_mape")
+        assert curve is not None
+        assert np.array_equal(curve.low, curve.mean)
+        assert np.array_equal(curve.high, curve.mean)

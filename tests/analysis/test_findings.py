@@ -1,0 +1,135 @@
+import math
+import shutil
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from analysis import findings
+from analysis.claims import SALONS
+from analysis.evidence import Verdict
+from analysis.findings import (
+    benefit_against_dimensions,
+    error_still_falls,
+    histogram_follows_target,
+    many_variables_are_plausible,
+)
+from analysis.runs import find_runs
+
+
+def make_salons(make_method, seeds: int, slope: float) -> None:  # type: ignore[no-untyped-def]
+    for salon in SALONS:
+        dimensions = int(salon.split("-")[1])
+        for seed in range(seeds):
+            error = 0.1 * dimensions**slope
+            make_method("active_exploration", scene=salon, seed=seed, error=error)
+            make_method("uniform", scene=salon, seed=seed)
+
+
+def test_benefit_per_doubling_is_the_slope(make_method, tmp_path) -> None:
+    make_salons(make_method, seeds=3, slope=-0.2)
+    (finding,) = benefit_against_dimensions(find_runs(tmp_path)[0])
+    assert finding.value == pytest.approx(100 * (2**-0.2 - 1), abs=1)
+    assert finding.low < finding.value < finding.high < 0
+    assert finding.verdict is Verdict.REPRODUCED
+
+
+def test_slope_is_least_squares(make_method, tmp_path) -> None:
+    errors = [0.1, 0.2, 0.05, 0.3, 0.08]
+    for salon, error in zip(SALONS, errors, strict=True):
+        make_method("active_exploration", scene=salon, error=error, spread=0)
+        make_method("uniform", scene=salon, spread=0)
+    (finding,) = benefit_against_dimensions(find_runs(tmp_path)[0])
+    slope = np.polyfit(np.log2([5, 7, 9, 10, 25]), np.log(errors), 1)[0]
+    assert finding.value == pytest.approx(100 * (np.exp(slope) - 1))
+    assert (finding.low, finding.verdict) == (None, Verdict.INCONCLUSIVE)
+
+
+def test_a_benefit_that_does_not_grow_is_not_reproduced(make_method, tmp_path) -> None:
+    make_salons(make_method, seeds=3, slope=0.0)
+    (finding,) = benefit_against_dimensions(find_runs(tmp_path)[0])
+    assert finding.verdict is Verdict.NOT_REPRODUCED
+
+
+def test_a_missing_salon_leaves_the_trend_open(make_method, tmp_path) -> None:
+    make_salons(make_method, seeds=3, slope=-0.5)
+    shutil.rmtree(tmp_path / "runs" / "salon-9")
+    (finding,) = benefit_against_dimensions(find_runs(tmp_path)[0])
+    assert finding.high < 0
+    assert finding.verdict is Verdict.INCONCLUSIVE
+
+
+def test_one_salon_has_no_slope(make_method, tmp_path) -> None:
+    make_method("active_exploration", scene="salon-5")
+    make_method("uniform", scene="salon-5")
+    assert benefit_against_dimensions(find_runs(tmp_path)[0]) == []
+
+
+@pytest.mark.parametrize(
+    ("rate", "verdict"), [(0.01, Verdict.REPRODUCED), (0.2, Verdict.NOT_REPRODUCED)]
+)
+def test_error_still_falls_in_the_second_half(make_method, tmp_path, rate, verdict) -> None:
+    for seed in range(3):
+        make_method("active_exploration", scene="bedroom", seed=seed, rate=rate)
+        make_method("uniform", scene="bedroom", seed=seed, rate=0.0)
+    (finding,) = error_still_falls(find_runs(tmp_path)[0])
+    expected = (1 + 7 * math.exp(-rate * 240)) / (1 + 7 * math.exp(-rate * 120))
+    assert finding.value == pytest.approx(100 * (expected - 1))
+    assert finding.verdict is verdict
+
+
+def test_chess_is_compared_with_the_worst_scene_and_its_start(make_method, tmp_path) -> None:
+    for seed in range(3):
+        make_method("active_exploration", scene="chess", seed=seed, error=0.1)
+        make_method("active_exploration", scene="bedroom", seed=seed, error=0.05)
+        make_method("active_exploration", scene="veach-egg", seed=seed, error=0.4)
+        make_method("uniform", scene="spaceship", seed=seed, error=0.9)
+    worst, start = many_variables_are_plausible(find_runs(tmp_path)[0])
+    assert worst.value == pytest.approx(-75, abs=2)
+    assert "2 scenes (veach-egg)" in worst.text
+    assert start.value == pytest.approx(100 * ((1 + 7 * math.exp(-2.4)) / 8 - 1))
+    assert start.verdict is Verdict.REPRODUCED
+
+
+def test_chess_alone_is_compared_with_its_start_only(make_method, tmp_path) -> None:
+    make_method("active_exploration", scene="chess")
+    (start,) = many_variables_are_plausible(find_runs(tmp_path)[0])
+    assert "first evaluation" in start.text
+    assert (start.low, start.verdict) == (None, Verdict.INCONCLUSIVE)
+
+
+def test_distances_have_to_fall_by_more_than_uniforms(make_method, tmp_path, monkeypatch) -> None:
+    ends = {"uniform": 0.4, "active_exploration": 0.2, "metropolis": 0.42}
+    for method in ends:
+        make_method(method, scene="mirror", reuse="never")
+        make_method(method, scene="mirror", seed=1)  # with reuse: not part of the claim
+    rows = [
+        {
+            "method": method,
+            "seed": seed,
+            "run_seconds": seconds,
+            "distance": distance + 0.001 * seed,
+        }
+        for method, end in ends.items()
+        for seed in range(3)
+        for seconds, distance in ((10.0, 0.5), (50.0, 9.0), (90.0, end - 0.001 * seed**2))
+    ]
+
+    def distances(runs) -> pd.DataFrame:  # type: ignore[no-untyped-def]
+        assert sorted((run.method, run.seed) for run in runs) == sorted((m, 0) for m in ends)
+        return pd.DataFrame(rows)
+
+    monkeypatch.setattr(findings, "histogram_distances", distances)
+    own, own_beyond, other, other_beyond = histogram_follows_target(find_runs(tmp_path)[0])
+    assert own.value == pytest.approx(-0.3, abs=0.01)
+    assert own_beyond.value == pytest.approx(-0.2, abs=0.01)
+    assert (own.verdict, own_beyond.verdict) == (Verdict.REPRODUCED, Verdict.REPRODUCED)
+    assert other.value == pytest.approx(-0.08, abs=0.01)
+    assert other.verdict is Verdict.REPRODUCED
+    assert other_beyond.value == pytest.approx(0.02, abs=1e-6)
+    assert other_beyond.verdict is Verdict.NOT_REPRODUCED
+
+
+def test_runs_without_a_target_map_have_no_distances(make_method, tmp_path) -> None:
+    make_method("active_exploration", scene="mirror", reuse="never")
+    assert histogram_follows_target(find_runs(tmp_path)[0]) == []

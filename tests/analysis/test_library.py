@@ -1,0 +1,114 @@
+import subprocess
+import sys
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from analysis import load_runs
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture
+def folder(make_run, tmp_path) -> Path:
+    for seed in range(2):
+        make_run(seed=seed, method="uniform")
+        make_run(seed=seed, method="active_exploration", quality=2.0, lpips=False)
+    make_run(scene="chess", method="uniform")
+    return tmp_path / "runs"
+
+
+def test_runs_have_labels_costs_and_provenance(folder) -> None:
+    runs = load_runs(str(folder)).runs
+    assert len(runs) == 5
+    assert runs[["scene", "method", "seed"]].drop_duplicates().shape[0] == 5
+    row = runs.query("scene == 'mirror' and method == 'uniform' and seed == 1").iloc[0]
+    assert (row["label.reuse"], row["protocol.name"]) == ("self_tuning", "demo")
+    assert (row["run_seconds"], row["steps"], row["seconds.render"]) == (241.0, 1010, 100.0)
+    assert row["scene_hash"] == "mirror-files"
+    assert Path(row["folder"]).is_dir()
+
+
+def test_evaluations_are_a_value_a_row(folder) -> None:
+    results = load_runs(folder)
+    assert len(results.evaluations) == 5 * 9 * 2 * 4 * 2
+    run = next(r for r in results.found if (r.scene, r.method, r.seed) == ("mirror", "uniform", 1))
+    rows = results.evaluations.query(
+        "scene == 'mirror' and method == 'uniform' and seed == 1 and set == 'hard' "
+        "and metric == 'dssim' and statistic == 'worst5'"
+    )
+    assert rows["value"].tolist() == run.history["hard_dssim_worst5"].tolist()
+    assert rows["run_seconds"].tolist() == run.history["run_seconds"].tolist()
+
+
+def test_frames_are_a_value_a_row(folder) -> None:
+    results = load_runs(folder)
+    run = next(r for r in results.found if (r.scene, r.method, r.seed) == ("mirror", "uniform", 1))
+    rows = results.frames.query(
+        "scene == 'mirror' and method == 'uniform' and seed == 1 and set == 'uniform' "
+        "and frame == 3 and metric == 'mae'"
+    )
+    (frame,) = (f for f in run.result["frames"] if (f["set"], f["index"]) == ("uniform", 3))
+    assert rows["value"].tolist() == [frame["mae"]]
+    assert len(results.frames) == 5 * 2 * 5 * 4
+
+
+def test_steps_are_read_where_there_are_any(folder) -> None:
+    (with_steps,) = folder.glob("chess/*/seed=0")
+    table = pd.DataFrame({"step": [1, 2], "loss": [0.5, 0.25]})
+    table.to_csv(with_steps / "steps.csv", index=False)
+    steps = load_runs(folder).steps
+    assert steps.values.tolist() == [
+        ["chess", "uniform", 0, 1, 0.5],
+        ["chess", "uniform", 0, 2, 0.25],
+    ]
+    (with_steps / "steps.csv").unlink()
+    assert load_runs(folder).steps.columns.tolist() == ["scene", "method", "seed"]
+
+
+def test_what_was_left_out_is_known(folder, make_run) -> None:
+    (make_run(seed=7) / "result.json").unlink()
+    (warning,) = load_runs(folder).warnings
+    assert "unfinished" in warning
+
+
+def test_a_folder_without_runs_is_an_error(tmp_path) -> None:
+    with pytest.raises(ValueError, match="no finished run"):
+        load_runs(tmp_path)
+
+
+def test_the_example_answers_its_questions(folder) -> None:
+    answer = subprocess.run(
+        [sys.executable, "-W", "error", "-m", "analysis.examples.questions", str(folder)],
+        capture_output=True,
+        text=True,
+        cwd=REPOSITORY,
+    )
+    assert answer.returncode == 0, answer.stderr
+    errors, seconds, hardest = answer.stdout.split("\n\n")[-3:]
+    results = load_runs(folder)
+    ends = {
+        method: [r.history["hard_mape"].iloc[-1] for r in results.found if r.method == method]
+        for method in ("uniform", "active_exploration")
+    }
+    assert max(ends["active_exploration"]) < min(ends["uniform"][:2])
+    (line,) = (line for line in seconds.splitlines() if "active_exploration" in line)
+    assert float(line.split()[-2]) < 240
+    assert "mirror" in errors
+    frames = results.frames.query("scene == 'mirror' and set == 'hard' and metric == 'mape'")
+    best = frames.groupby(["frame", "method"])["value"].mean().unstack().min(axis=1)
+    top = {str(frame) for frame in best.nlargest(3).index}
+    rows = [line.split() for line in hardest.splitlines() if line.endswith("active_exploration")]
+    assert {row[-4] for row in rows} == top
+
+
+def test_importing_the_library_loads_nothing_heavy() -> None:
+    code = (
+        "import sys, analysis; "
+        "print([m for m in ('torch', 'mitsuba', 'ngi', 'matplotlib') if m in sys.modules])"
+    )
+    answer = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=REPOSITORY
+    )
+    assert answer.stdout.strip() == "[]", answer.stderr

@@ -1,0 +1,111 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis.runs import Run
+from analysis.target_map import PATCHES_PER_CELL, histogram_distances, windows
+from tests.analysis.traces import CHAINS, write_maps, write_trace
+
+CELLS = 8
+STEPS = [100, 250]
+DENSITY = np.outer(np.arange(1.0, CELLS + 1) ** 2, np.full(CELLS, 3.0))
+"""Rises along the first variable, is the same along the second."""
+
+
+def states_from(density: np.ndarray, count: int, seed: int) -> np.ndarray:
+    """[count, 4] independent states, uniform within the cells."""
+    generator = np.random.default_rng(seed)
+    cell = generator.choice(density.size, size=count, p=(density / density.sum()).ravel())
+    corner = np.stack(np.unravel_index(cell, density.shape), axis=-1)
+    v = (corner + generator.random((count, 2))) / CELLS
+    return np.concatenate([v, generator.random((count, 2))], axis=1)
+
+
+def make(folder: Path, density: np.ndarray, *, seed: int = 0) -> Run:
+    """A run whose chains draw independently from `density`, whatever its map, `DENSITY`, says."""
+    folder.mkdir()
+    position = states_from(density, STEPS[-1] * CHAINS, seed).reshape(-1, CHAINS, 4)
+    write_trace(folder, position, np.ones(position.shape[:2], dtype=bool))
+    write_maps(folder, DENSITY, STEPS)
+    return Run(folder, {"label": {"scene": "mirror"}, "seed": seed}, None, "method")  # type: ignore[arg-type]
+
+
+def test_the_windows_hold_the_states_since_the_last_map(tmp_path: Path) -> None:
+    first, second = windows(make(tmp_path / "run", DENSITY))
+    assert (first.counts.sum(), second.counts.sum()) == (100 * CHAINS, 150 * CHAINS)
+    assert (first.step, second.step, second.run_seconds) == (100, 250, 500.0)
+    np.testing.assert_allclose(second.density, DENSITY / DENSITY.sum(), rtol=1e-6)
+    # The first index is the first variable, as in the map: 1², 2², … along it.
+    expected = np.arange(1.0, CELLS + 1) ** 2 / 204
+    np.testing.assert_allclose(second.counts.sum(axis=(0, 2)) / 2400, expected, atol=0.03)
+    np.testing.assert_allclose(second.counts.sum(axis=(0, 1)) / 2400, 1 / CELLS, atol=0.03)
+
+
+@pytest.mark.parametrize(
+    ("density", "excess"),
+    [(DENSITY, 0.0), (np.ones((CELLS, CELLS)), 1.0)],
+    ids=["target", "uniform"],
+)
+def test_states_of_the_target_are_at_0_and_uniform_ones_at_1(
+    tmp_path: Path, density: np.ndarray, excess: float
+) -> None:
+    runs = [make(tmp_path / str(seed), density, seed=seed) for seed in range(4)]
+    table = histogram_distances(runs)
+    assert table["step"].tolist() == STEPS * 4
+    assert set(table["scene"]) == {"mirror"}
+    assert table["excess"].mean() == pytest.approx(excess, abs=0.03)
+    assert (table["floor"] < table["uniform_distance"]).all()
+    first, second = (table[table["step"] == step] for step in STEPS)
+    assert first["floor"].iloc[0] > second["floor"].iloc[0]  # of fewer states
+
+
+def test_a_histogram_beside_its_target_has_distance_1(tmp_path: Path) -> None:
+    run = make(tmp_path / "run", np.eye(CELLS))
+    (run.folder / "target_map.bin").unlink()
+    write_maps(run.folder, np.eye(CELLS)[::-1], STEPS)
+    assert histogram_distances([run])["distance"].tolist() == pytest.approx([1, 1])
+
+
+def test_patch_positions_are_compared_on_their_own(tmp_path: Path) -> None:
+    run = make(tmp_path / "run", DENSITY)  # patch positions are uniform, the map's rise with x
+    last = windows(run, "patch")[-1]
+    cells = len(last.density)
+    assert last.density.size <= CELLS * CELLS * 16 / PATCHES_PER_CELL
+    rise = (2 * np.arange(cells) + 1) / cells**2
+    np.testing.assert_allclose(last.density.sum(axis=1), rise, atol=0.03)
+    np.testing.assert_allclose(
+        last.counts.sum(axis=(0, 2)) / last.counts.sum(), 1 / cells, atol=0.03
+    )
+    assert histogram_distances([run], "patch")["excess"].iloc[-1] == pytest.approx(1, abs=0.1)
+
+
+def test_correlation_within_a_chain_is_no_excess(tmp_path: Path) -> None:
+    """Chains that hold every state of the target for ten batches: fewer, but the same states."""
+    excess, error, distance, floor = [], [], [], []
+    for seed in range(6):
+        run = make(tmp_path / str(seed), DENSITY, seed=seed)
+        moved = np.zeros((STEPS[-1], CHAINS), dtype=bool)
+        moved[::10] = True
+        (run.folder / "chains.bin").unlink()
+        position = states_from(DENSITY, moved.size, seed).reshape(-1, CHAINS, 4)
+        write_trace(run.folder, position, moved)
+        table = histogram_distances([run])
+        for values, column in zip(
+            (excess, error, distance, floor),
+            ("excess", "excess_error", "distance", "floor"),
+            strict=True,
+        ):
+            values.extend(table[column])
+    assert np.mean(distance) > 1.5 * np.mean(floor)  # what the plain distance would say
+    assert np.mean(excess) == pytest.approx(0, abs=0.1)
+    assert 0.5 < np.std(excess) / np.mean(error) < 2
+
+
+@pytest.mark.parametrize("file", ["chains.bin", "target_map.bin"])
+def test_runs_without_map_or_trace_have_no_rows(tmp_path: Path, file: str) -> None:
+    run = make(tmp_path / "run", DENSITY)
+    (run.folder / file).unlink()
+    table = histogram_distances([run])
+    assert table.empty
+    assert {"scene", "method", "seed", "step", "run_seconds", "distance"} < set(table.columns)

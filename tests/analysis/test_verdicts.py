@@ -1,0 +1,173 @@
+from pathlib import Path
+
+import pytest
+import yaml
+
+from analysis.claims import CLAIMS
+from analysis.methods import TITLES, name_methods
+from analysis.runs import find_runs
+from analysis.verdicts import ALL_SCENES, ClaimResult, Verdict, judge
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+
+
+def judged(folder: Path) -> dict[str, ClaimResult]:
+    return {result.claim.id: result for result in judge(name_methods(find_runs(folder)[0]))}
+
+
+@pytest.mark.parametrize("claim", [claim for claim in CLAIMS if claim.built], ids=lambda c: c.id)
+def test_a_claim_needs_what_its_sweep_runs(claim) -> None:
+    sweep = yaml.safe_load((REPOSITORY / "sweeps" / f"{claim.id}.yaml").read_text())
+    parameters = sweep["hydra"]["sweeper"]["params"]
+    scenes = {scene for comparison in claim.comparisons for scene in comparison.scenes}
+    methods = {m for comparison in claim.comparisons for m in (comparison.better, comparison.worse)}
+    assert scenes == set(parameters["scene"].split(","))
+    assert methods <= set(parameters["method"].split(","))
+    assert claim.command == f"python -m ngi.train -m +sweeps={claim.id} budget=small"
+
+
+def test_every_option_of_method_has_a_title() -> None:
+    options = {file.stem for file in (REPOSITORY / "conf" / "method").glob("*.yaml")}
+    assert options == set(TITLES)
+
+
+def test_claims_without_runs_say_how_to_run_them(make_run, tmp_path) -> None:
+    make_run(sampler="mcmc_loss_step")
+    results = judged(tmp_path)
+    assert list(results) == [claim.id for claim in CLAIMS]
+    assert results["cnsr"].verdict is results["anf"].verdict is Verdict.NOT_BUILT
+    rest = [result for id, result in results.items() if id not in ("cnsr", "anf")]
+    assert {result.verdict for result in rest} == {Verdict.NOT_RUN}
+    assert {result.comparisons + result.findings for result in rest} == {()}
+    assert results["chess"].claim.command in results["chess"].sentence
+
+
+def test_scenes_are_judged_one_by_one_and_together(make_method, tmp_path) -> None:
+    for scene, error in {"sphere-caustic": 0.05, "living-room": 0.06}.items():
+        for seed in range(3):
+            make_method("active_exploration", scene=scene, seed=seed, error=error)
+            make_method("metropolis", scene=scene, seed=seed)
+    result = judged(tmp_path)["acceptance"]
+    assert [c.scene for c in result.comparisons] == ["sphere-caustic", "living-room", ALL_SCENES]
+    assert all(comparison.decides for comparison in result.comparisons)
+    assert result.verdict is Verdict.REPRODUCED
+    pooled = result.comparisons[-1].decisive
+    numbers = f"{-pooled.effect_percent:.1f} % less error (95 % interval {pooled.low:+.1f} to"
+    text = f"Active Exploration against Metropolis acceptance on 2 scenes: {numbers}"
+    assert text in result.sentence
+    assert "less on 2 of them" in result.sentence
+
+
+def test_a_missing_scene_leaves_the_claim_open(make_method, tmp_path) -> None:
+    for scene in ("bedroom", "bathroom"):
+        for seed in range(3):
+            make_method("active_exploration", scene=scene, seed=seed, error=0.05)
+            make_method("uniform", scene=scene, seed=seed)
+    result = judged(tmp_path)["same_time"]
+    assert result.comparisons[-1].verdict is Verdict.REPRODUCED
+    assert result.verdict is Verdict.INCONCLUSIVE
+    assert "5 of 7 scenes are not run yet" in result.sentence
+
+
+def resolution(make_method, growing: float) -> None:  # type: ignore[no-untyped-def]
+    errors = {"active_exploration": 0.05, "constant_resolution": 0.07, "uniform": 0.1}
+    for method, error in (errors | {"uniform_growing": growing}).items():
+        for seed in range(3):
+            make_method(method, seed=seed, error=error)
+
+
+def test_every_part_of_a_claim_has_to_hold(make_method, tmp_path) -> None:
+    resolution(make_method, growing=0.08)
+    result = judged(tmp_path)["resolution"]
+    verdicts = [(c.better, c.worse, c.verdict, c.decides) for c in result.comparisons]
+    assert verdicts == [
+        ("active_exploration", "constant_resolution", Verdict.REPRODUCED, True),
+        ("uniform", "uniform_growing", Verdict.NOT_REPRODUCED, True),
+        ("active_exploration", "uniform", Verdict.REPRODUCED, False),
+    ]
+    assert result.verdict is Verdict.NOT_REPRODUCED
+    assert "more error" in result.sentence
+
+
+def test_a_claim_with_both_parts(make_method, tmp_path) -> None:
+    resolution(make_method, growing=0.13)
+    assert judged(tmp_path)["resolution"].verdict is Verdict.REPRODUCED
+
+
+def test_a_missing_part_leaves_the_claim_open(make_method, tmp_path) -> None:
+    for seed in range(3):
+        make_method("active_exploration", seed=seed, error=0.05)
+        make_method("constant_resolution", seed=seed)
+    result = judged(tmp_path)["resolution"]
+    assert result.verdict is Verdict.INCONCLUSIVE
+    assert "no runs yet of uniform sampling and uniform sampling with growing" in result.sentence
+
+
+def test_what_is_shown_beside_does_not_decide(make_method, tmp_path) -> None:
+    for seed in range(3):
+        make_method("active_exploration", seed=seed, error=0.05)
+        make_method("loss_target", seed=seed)
+        make_method("output_gradient_target", seed=seed, error=0.2)
+    result = judged(tmp_path)["target_function"]
+    assert [c.verdict for c in result.comparisons] == [Verdict.REPRODUCED, Verdict.NOT_REPRODUCED]
+    assert result.verdict is Verdict.REPRODUCED
+    assert "output" not in result.sentence
+
+
+def test_a_finding_decides_too(make_method, tmp_path) -> None:
+    for seed in range(3):
+        make_method("traced_specular", scene="bedroom", seed=seed, error=0.05)
+        make_method("active_exploration", scene="bedroom", seed=seed, rate=0.2)
+    result = judged(tmp_path)["specular"]
+    assert result.comparisons[0].verdict is Verdict.REPRODUCED
+    assert result.verdict is Verdict.NOT_REPRODUCED
+    assert "second half of the run" in result.sentence
+
+
+def test_a_missing_finding_leaves_the_claim_open(make_method, tmp_path) -> None:
+    for seed in range(3):
+        make_method("active_exploration", scene="mirror", seed=seed, error=0.05, reuse="never")
+        make_method("uniform", scene="mirror", seed=seed, reuse="never")
+    result = judged(tmp_path)["histogram"]
+    assert result.comparisons[0].verdict is Verdict.REPRODUCED
+    assert (result.findings, result.verdict) == ((), Verdict.INCONCLUSIVE)
+    assert "not measured in these runs" in result.sentence
+
+
+def test_an_open_question_says_how_many_seeds_would_answer_it(make_method, tmp_path) -> None:
+    for seed in range(3):
+        make_method("active_exploration", seed=seed, error=0.11, spread=0.3)
+        make_method("no_preconditioning", seed=seed, spread=0.3)
+    result = judged(tmp_path)["preconditioning"]
+    needed = result.comparisons[0].seeds_needed
+    assert result.verdict is Verdict.INCONCLUSIVE
+    assert (f"{needed} seeds would" if needed <= 100 else "more than 100 seeds") in result.sentence
+
+
+def test_no_difference_is_said_so(make_method, tmp_path) -> None:
+    for seed in range(3):
+        make_method("active_exploration", seed=seed, spread=0.001)
+        make_method("no_preconditioning", seed=seed, spread=0.001)
+    result = judged(tmp_path)["preconditioning"]
+    assert result.verdict is Verdict.NOT_REPRODUCED
+    assert "a difference of 2 % or more is excluded" in result.sentence
+
+
+def test_errors_that_are_not_finite_are_said_so(make_method, tmp_path) -> None:
+    def spoil(result: dict) -> None:
+        result["frames"][0]["mae"] = float("nan")
+
+    for seed in range(3):
+        make_method("active_exploration", seed=seed, change=spoil)
+        make_method("no_preconditioning", seed=seed)
+    result = judged(tmp_path)["preconditioning"]
+    assert result.verdict is Verdict.INCONCLUSIVE
+    assert "not finite" in result.sentence
+
+
+def test_one_seed_decides_nothing(make_method, tmp_path) -> None:
+    make_method("active_exploration", error=0.01)
+    make_method("no_preconditioning")
+    result = judged(tmp_path)["preconditioning"]
+    assert result.verdict is Verdict.INCONCLUSIVE
+    assert "one seed decides nothing" in result.sentence
