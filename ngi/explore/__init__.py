@@ -11,9 +11,7 @@ from ngi.explore.proposals import (
     ProposalDistribution,
     Proposals,
 )
-from ngi.explore.resolution import Constant as ConstantResolution
-from ngi.explore.resolution import Growing as GrowingResolution
-from ngi.explore.resolution import ResolutionSchedule
+from ngi.explore.resolution import GrowingResolution, ResolutionSchedule
 from ngi.explore.targets import Constant as ConstantTarget
 from ngi.explore.targets import Loss, LossTimesOutputGradient, LossTimesStep, Signals, Target
 
@@ -22,7 +20,6 @@ __all__ = [
     "Always",
     "ChainInfo",
     "ChainState",
-    "ConstantResolution",
     "ConstantTarget",
     "ExponentialPerturbation",
     "Greedy",

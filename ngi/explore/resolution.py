@@ -13,24 +13,12 @@ class ResolutionSchedule(Protocol):
         ...
 
 
-class Constant:
-    """One resolution for the whole training: the paper's ablation and its uniform baseline."""
-
-    def __init__(self, *, resolution: int) -> None:
-        _check_positive(resolution=resolution)
-        self._resolution = resolution
-
-    def resolution(self, iteration: int) -> int:  # noqa: ARG002 - the same at all of them
-        """See `ResolutionSchedule`."""
-        return self._resolution
-
-
-class Growing:
+class GrowingResolution:
     """Starts at `start` pixels and grows by `step` every `every` iterations, up to `end`.
 
     The paper (Sec. 6.2) starts at 128 and grows by 4 every 2,000 iterations up to 600, which it
     reaches at iteration 236,000. The growth lets small steps close in on details; it helps
-    exploration and hurts uniform sampling.
+    exploration and hurts uniform sampling, whose resolution stays: `step` is 0.
     """
 
     def __init__(self, *, start: int, step: int, every: int, end: int) -> None:

@@ -1,6 +1,6 @@
 import pytest
 
-from ngi.explore import ConstantResolution, GrowingResolution
+from ngi.explore import GrowingResolution
 
 
 def test_growing_follows_the_paper() -> None:
@@ -15,12 +15,14 @@ def test_growing_stops_at_an_end_it_does_not_hit_by_steps() -> None:
     assert [schedule.resolution(i) for i in range(4)] == [10, 14, 17, 17]
 
 
-def test_constant_stays() -> None:
-    assert {ConstantResolution(resolution=128).resolution(i) for i in (0, 1, 10**9)} == {128}
+def test_without_a_step_it_stays() -> None:
+    schedule = GrowingResolution(start=128, step=0, every=2000, end=600)
+    assert {schedule.resolution(i) for i in (0, 2000, 10**9)} == {128}
 
 
-@pytest.mark.parametrize("key", ["start", "step", "every", "end"])
-@pytest.mark.parametrize("value", [0, -1])
+@pytest.mark.parametrize(
+    ("key", "value"), [("start", 0), ("start", -1), ("step", -1), ("every", 0), ("end", 0)]
+)
 def test_growing_rejects_what_is_not_positive(key, value) -> None:
     arguments = {"start": 128, "step": 4, "every": 2000, "end": 600} | {key: value}
     with pytest.raises(ValueError, match=f"{key}: {value}"):
@@ -30,7 +32,5 @@ def test_growing_rejects_what_is_not_positive(key, value) -> None:
 def test_other_bad_values_are_rejected() -> None:
     with pytest.raises(ValueError, match="end: 100"):
         GrowingResolution(start=128, step=4, every=2000, end=100)
-    with pytest.raises(ValueError, match="resolution: 0"):
-        ConstantResolution(resolution=0)
     with pytest.raises(ValueError, match="iteration: -1"):
         GrowingResolution(start=128, step=4, every=2000, end=600).resolution(-1)

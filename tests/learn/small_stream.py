@@ -5,9 +5,9 @@ from pathlib import Path
 
 from ngi.explore import (
     Always,
-    ConstantResolution,
     ConstantTarget,
     Greedy,
+    GrowingResolution,
     Loss,
     MarkovChains,
     NormalPerturbation,
@@ -20,6 +20,10 @@ from ngi.render import AnalyticRenderer
 from ngi.reuse import FixedProbability, PatchArchive, PatchStore, ReusePolicy
 
 CHAINS = 4
+
+
+def constant_resolution(pixels: int) -> GrowingResolution:
+    return GrowingResolution(start=pixels, step=0, every=1, end=pixels)
 
 
 def make(
@@ -46,7 +50,7 @@ def make(
         store=PatchStore(capacity=capacity, layout=renderer.layout),
         archive=PatchArchive(folder),
         policy=policy or FixedProbability(bootstrap_batches=3, probability=0.5),
-        schedule=schedule or ConstantResolution(resolution=24),
+        schedule=schedule or constant_resolution(24),
         clock=clock or PhaseClock(),
         seed=seed,
         when_late=when_late,

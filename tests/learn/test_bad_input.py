@@ -13,7 +13,7 @@ from tests.learn.command_line import BRIEF, run
         (["budget.steps=0"], ["budget.steps", "0"]),
         (["sampler=surprise"], ["sampler/surprise", "mcmc_loss_step", "uniform"]),
         (["scene=nowhere"], ["scene/nowhere", "sphere-caustic"]),
-        (["resolution.resolution=8"], ["resolution", "8", "16", "patch"]),
+        (["resolution.start=8"], ["resolution", "8", "16", "patch"]),
         (["sampler.chains=0"], ["chains", "0"]),
         (["evaluation.count=0"], ["evaluation.count"]),
         (["model.hidden_layers=0"], ["hidden_layers"]),

@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 import torch
 
-from ngi.explore import ConstantResolution, GrowingResolution
+from ngi.explore import GrowingResolution
 from ngi.reuse import Never, UntilFull
-from tests.learn.small_stream import CHAINS, make, steps
+from tests.learn.small_stream import CHAINS, constant_resolution, make, steps
 
 
 def test_first_batches_are_new_and_later_ones_are_not_all(tmp_path: Path) -> None:
@@ -96,7 +96,7 @@ def test_a_batch_without_feedback_stops_the_stream(tmp_path: Path) -> None:
 
 def test_a_patch_larger_than_the_image_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"7 pixels a side.*patch of 8"):
-        make(tmp_path, schedule=ConstantResolution(resolution=7))
+        make(tmp_path, schedule=constant_resolution(7))
 
 
 def test_a_store_without_room_for_chains_and_batch_is_refused(tmp_path: Path) -> None:
