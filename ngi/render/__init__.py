@@ -5,6 +5,14 @@ here does not.
 """
 
 from ngi.render.analytic import AnalyticRenderer
+from ngi.render.pockets import PocketRenderer
 from ngi.render.protocol import Deferred, PatchJob, RenderedPatches, Renderer
 
-__all__ = ["AnalyticRenderer", "Deferred", "PatchJob", "RenderedPatches", "Renderer"]
+__all__ = [
+    "AnalyticRenderer",
+    "Deferred",
+    "PatchJob",
+    "PocketRenderer",
+    "RenderedPatches",
+    "Renderer",
+]

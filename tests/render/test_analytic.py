@@ -61,6 +61,23 @@ def test_noise_is_seeded_per_state_and_falls_with_the_samples() -> None:
     torch.testing.assert_close(error, torch.tensor(0.1), atol=0.01, rtol=0)
 
 
+def test_noise_of_two_patches_is_not_the_same() -> None:
+    same_place = states(2)
+    same_place[1, :-2] = 0.5
+    same_place[:, -2:] = 0.3
+    clean = make().render_patches(same_place, resolution=16, seed=0).log_radiance.expm1()
+    noisy = make(noise=0.2).render_patches(same_place, resolution=16, seed=0).log_radiance.expm1()
+    error = (noisy / clean - 1).flatten(1)
+    assert abs(torch.corrcoef(error)[0, 1]) < 0.3
+
+
+def test_pixels_are_evaluated_at_their_centres() -> None:
+    position = make().image_buffers(torch.rand(3), resolution=4)[..., :3]
+    centres = torch.tensor([0.125, 0.375, 0.625, 0.875])
+    torch.testing.assert_close(position[2, :, 0], centres)
+    torch.testing.assert_close(position[:, 1, 1], centres)
+
+
 def test_hard_frames_and_hash() -> None:
     frames = make(dimensions=5).hard_frames()
     assert frames.shape == (10, 5)

@@ -239,5 +239,5 @@ def test_workers_are_no_part_of_a_runs_identity() -> None:
         assert config.hydra.job.override_dirname == ""
         with open_dict(config):
             del config.hydra
-        settings.append(_settings(config, scene_hash=""))
+        settings.append(_settings(config, scene_hash="", costs=None))
     assert settings[0] == settings[1]

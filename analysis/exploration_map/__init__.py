@@ -1,0 +1,1 @@
+"""Draws the map of when exploration pays: `python -m analysis.exploration_map FOLDER`."""

@@ -1,0 +1,81 @@
+"""What is varied on the map: the scene's knobs, the network's size, and the methods compared."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from itertools import product
+from typing import Any
+
+TARGETS = {
+    "loss": "ngi.explore.Loss",
+    "loss_step": "ngi.explore.LossTimesStep",
+    "output_gradient": "ngi.explore.LossTimesOutputGradient",
+}
+ACCEPTANCES = {"greedy": "mcmc_loss_step", "metropolis": "mcmc_metropolis"}
+"""And the option of the program's configuration that has it, all else being the same."""
+
+UNIFORM = "uniform"
+SAMPLERS = (UNIFORM, *(f"{target}_{rule}" for target, rule in product(TARGETS, ACCEPTANCES)))
+
+REUSE = ("reuse=self_tuning", "reuse.policy.bootstrap_batches=20", "reuse.policy.beta=2.0")
+"""As in all small budgets: with the paper's 100 and 4.6 hardly a batch would be new."""
+NO_REUSE = ("reuse=never",)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setting:
+    """One point of the map; the defaults are the point that single knobs are varied from.
+
+    All but hidden_features, the width of the network, are arguments of `ngi.render.PocketRenderer`.
+    """
+
+    volume: float = 0.01
+    dimensions: int = 8
+    active: int = 4
+    pockets: int = 1
+    sharpness: float = 0.0
+    noise: float = 0.0
+    hidden_features: int = 64
+
+    @property
+    def scene(self) -> dict[str, Any]:
+        """The renderer's arguments."""
+        return {name: value for name, value in asdict(self).items() if name != "hidden_features"}
+
+    @property
+    def name(self) -> str:
+        """For a folder: 'volume=0.01,dimensions=8,…'."""
+        return ",".join(f"{name}={value:g}" for name, value in asdict(self).items())
+
+
+@dataclass(frozen=True)
+class Method:
+    """A way of choosing samples.
+
+    sampler: one of `SAMPLERS`: "uniform", or a target and an acceptance rule
+    reuse: whether stored patches are trained on again, as the self-tuning policy says
+    """
+
+    sampler: str
+    reuse: bool
+
+    @property
+    def name(self) -> str:
+        """For a file: 'loss_greedy', 'loss_greedy-reuse'."""
+        return self.sampler + "-reuse" * self.reuse
+
+    @property
+    def overrides(self) -> list[str]:
+        """What it changes in the program's configuration."""
+        reuse = REUSE if self.reuse else NO_REUSE
+        if self.sampler == UNIFORM:
+            return [f"sampler={UNIFORM}", *reuse]
+        target, rule = self.sampler.rsplit("_", 1)
+        return [
+            f"sampler={ACCEPTANCES[rule]}",
+            f"sampler.target._target_={TARGETS[target]}",
+            *reuse,
+        ]
+
+
+METHODS = tuple(Method(sampler, reuse) for reuse, sampler in product((False, True), SAMPLERS))

@@ -1,0 +1,142 @@
+"""What renderers made of closed formulas share: pixels, seeds, noise; all but the formula."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from hashlib import sha256
+from math import sqrt
+
+import torch
+from torch import Tensor
+
+from ngi.patches import BufferLayout
+from ngi.render.protocol import Deferred, RenderedPatches
+from ngi.render.render_inputs import check_states, patch_window, require_positive
+from ngi.render.tracing import derive_seed
+
+GOLDEN_RATIO = (1 + sqrt(5)) / 2
+
+
+class ClosedFormRenderer(ABC):
+    """A `ngi.render.Renderer` of the unit square, in pure PyTorch; subclasses give the formula.
+
+    Everything is evaluated at pixel centres, so that a patch equals the same pixels of the image.
+
+    dimensions: D, at least 1. patch_size: P. samples_per_pixel: only scales the noise.
+    noise: relative standard deviation of the radiance at one sample per pixel, 0 for none.
+    layout: which buffers there are.
+    formula: name, version and numbers of the formula, for the scene's hash.
+    Raises ValueError for numbers out of range.
+    """
+
+    description = "closed formulas, PyTorch"
+
+    def __init__(
+        self,
+        *,
+        dimensions: int,
+        patch_size: int,
+        samples_per_pixel: int,
+        noise: float,
+        layout: BufferLayout,
+        formula: tuple[object, ...],
+    ) -> None:
+        require_positive(
+            dimensions=dimensions, patch_size=patch_size, samples_per_pixel=samples_per_pixel
+        )
+        if not 0 <= noise < float("inf"):
+            raise ValueError(f"renderer.noise is {noise}; expected a finite number from 0 up")
+        self.layout = layout
+        self.dimensions = dimensions
+        self.patch_size = patch_size
+        self.samples_per_pixel = samples_per_pixel
+        self.noise = noise
+        content = (*formula, dimensions, float(noise), layout.names)
+        self.scene_hash = sha256(repr(content).encode()).hexdigest()
+
+    @abstractmethod
+    def shade(self, scene_vectors: Tensor, points: Tensor) -> tuple[Tensor, Tensor]:
+        """Buffers [n, h, w, C] and noise-free linear radiance [n, h, w, 3].
+
+        scene_vectors: [n, D] in [0, 1]
+        points: [n, h, w, 2], x and y in the unit square
+        """
+
+    @abstractmethod
+    def hard_frames(self) -> Tensor:
+        """See `ngi.render.Renderer.hard_frames`."""
+
+    def warm_up(self) -> None:  # noqa: B027 - not abstract: right for every formula
+        """Nothing is compiled."""
+
+    def render_patches(self, states: Tensor, *, resolution: int, seed: int) -> RenderedPatches:
+        """See `ngi.render.Renderer.render_patches`."""
+        check_states(states, self.dimensions)
+        P = self.patch_size
+        windows = [patch_window(p, patch_size=P, resolution=resolution) for p in states[:, -2:]]
+        corners = torch.tensor([(w.x, w.y) for w in windows]).reshape(-1, 2)
+        buffers, radiance = self.shade(states[:, :-2], _pixel_centres(corners, P, resolution))
+        if self.noise > 0:
+            for clean, state in zip(radiance, states, strict=True):
+                number = derive_seed(seed, state.numpy().tobytes(), resolution)
+                clean.copy_(self._noisy(clean, self.samples_per_pixel, number))
+        return RenderedPatches(
+            buffers=buffers,
+            log_radiance=torch.log1p(radiance),
+            repaired=0,
+            masked=0,
+            paths=len(states) * P * P * self.samples_per_pixel,
+        )
+
+    def start_patches(self, states: Tensor, *, resolution: int, seed: int) -> Deferred:
+        """See `ngi.render.Renderer.start_patches`."""
+        return Deferred(lambda: self.render_patches(states, resolution=resolution, seed=seed))
+
+    def render_image(
+        self, scene_vector: Tensor, *, resolution: int, samples_per_pixel: int, seed: int
+    ) -> Tensor:
+        """See `ngi.render.Renderer.render_image`."""
+        require_positive(samples_per_pixel=samples_per_pixel)
+        _, clean = self.whole_image(scene_vector, resolution)
+        number = derive_seed(seed, scene_vector.numpy().tobytes(), resolution)
+        return self._noisy(clean, samples_per_pixel, number)
+
+    def image_buffers(self, scene_vector: Tensor, *, resolution: int) -> Tensor:
+        """See `ngi.render.Renderer.image_buffers`."""
+        buffers, _ = self.whole_image(scene_vector, resolution)
+        return buffers
+
+    def close(self) -> None:  # noqa: B027
+        """Nothing works elsewhere."""
+
+    def whole_image(self, v: Tensor, resolution: int) -> tuple[Tensor, Tensor]:
+        """Buffers [H, W, C] and noise-free radiance [H, W, 3] of resolution x resolution pixels."""
+        require_positive(resolution=resolution)
+        check_states(torch.cat([v, v.new_zeros(2)])[None], self.dimensions)
+        points = _pixel_centres(torch.zeros(1, 2), resolution, resolution)
+        buffers, radiance = self.shade(v[None], points)
+        return buffers[0], radiance[0]
+
+    def _noisy(self, radiance: Tensor, samples: int, seed: int) -> Tensor:
+        if self.noise == 0:
+            return radiance
+        generator = torch.Generator().manual_seed(seed)
+        error = torch.randn(radiance.shape, generator=generator) * self.noise / sqrt(samples)
+        return radiance * (1 + error).clamp(min=0)
+
+
+def _pixel_centres(corners: Tensor, size: int, resolution: int) -> Tensor:
+    """[n, size, size, 2]: x and y in the unit square, from the first pixels [n, 2] on."""
+    steps = torch.meshgrid(torch.arange(size), torch.arange(size), indexing="xy")
+    return (corners[:, None, None] + torch.stack(steps, -1) + 0.5) / resolution
+
+
+def spread_points(count: int, dimensions: int) -> Tensor:
+    """[count, dimensions]: fixed points in [0, 1), no two alike."""
+    index = torch.arange(1.0, count + 1)[:, None]
+    return torch.frac(index * torch.arange(1.0, dimensions + 1) * GOLDEN_RATIO)
+
+
+def spread_weights(quantities: int, variables: int) -> Tensor:
+    """[quantities, variables]: irrational weights in [0.5, 1.5), by which quantities differ."""
+    return 0.5 + spread_points(quantities, variables)
