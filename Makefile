@@ -32,6 +32,7 @@ lint: setup
 smoke: setup
 	@rm -rf outputs/smoke
 	@$(BIN)/python -m ngi.train -m +sweeps=smoke
+	@$(BIN)/python -m ngi.train -m +sweeps=acceptance budget=smoke seed=0
 	@$(BIN)/python -m analysis.report outputs/smoke
 
 report: setup ## all sweeps at BUDGET=smoke|small|paper: runs what is missing, builds the report
