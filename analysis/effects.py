@@ -115,8 +115,10 @@ def pool(results: Sequence[ComparisonResult]) -> ComparisonResult:
 
 def _pooled_effect(effects: Sequence[Effect]) -> Effect:
     means = np.log1p(np.array([effect.effect_percent for effect in effects]) / 100)
-    return replace(
+    pooled = replace(
         paired_effect(means[:, None]),
         seeds=min(effect.seeds for effect in effects),
         frames=min(effect.frames for effect in effects),
     )
+    # One seed shows what happened once in each scene, not how it scatters.
+    return pooled if pooled.seeds > 1 else replace(pooled, low=None, high=None, hedges_g=None)

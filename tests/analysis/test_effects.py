@@ -187,3 +187,14 @@ def test_scenes_are_pooled_as_draws(make_method, tmp_path) -> None:
     agreeing = pool(results[:2])
     assert agreeing.decisive.high > 0
     assert agreeing.verdict is Verdict.REPRODUCED
+
+
+def test_scenes_of_one_seed_each_decide_nothing_together(make_method, tmp_path) -> None:
+    scenes = ("living-room", "bathroom", "bedroom", "chess")
+    for scene in scenes:
+        make_method("active_exploration", scene=scene, error=0.05)
+        make_method("uniform", scene=scene)
+    pooled = pool([compare(tmp_path, scene) for scene in scenes])
+    assert pooled.decisive.effect_percent < -40
+    assert (pooled.decisive.low, pooled.decisive.high) == (None, None)
+    assert pooled.verdict is Verdict.INCONCLUSIVE
