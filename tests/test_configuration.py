@@ -125,10 +125,15 @@ def test_every_sweep_of_the_paper_is_there_at_every_budget(sweep: str, budget: s
     for scene in scenes:
         config = composed(f"+sweeps={sweep}", f"budget={budget}", f"scene={scene}")
         assert config.scene.name == scene
+    reuse = [f"reuse={params.reuse}"] if "reuse" in params else []
     for method in methods:
-        config = composed(f"+sweeps={sweep}", f"budget={budget}", f"method={method}")
+        config = composed(f"+sweeps={sweep}", f"budget={budget}", f"method={method}", *reuse)
         assert config.label.budget == budget
         assert config.label.method == method
+        for part in (config.sampler, config.reuse.policy, config.resolution, config.budget):
+            instantiate(part)
+        network = instantiate(config.model)(layout=BufferLayout(), scene_dimensions=3)
+        assert isinstance(network, PixelGenerator)
 
 
 def test_runs_that_two_sweeps_need_are_one_run() -> None:
