@@ -11,6 +11,7 @@ import pandas as pd
 
 from analysis.methods import name_methods
 from analysis.runs import METRICS, SETS, Run, find_runs
+from analysis.step_log import read_steps
 
 KEYS = ["scene", "method", "seed"]
 
@@ -82,8 +83,12 @@ class Results:
 
         Runs without steps.csv have no rows.
         """
-        files = [run.folder / "steps.csv" for run in self.found]
-        return self._tables([pd.read_csv(f) if f.is_file() else pd.DataFrame() for f in files])
+        return self._tables(
+            [
+                read_steps(run) if (run.folder / "steps.csv").is_file() else pd.DataFrame()
+                for run in self.found
+            ]
+        )
 
     def _tables(self, tables: Sequence[pd.DataFrame]) -> pd.DataFrame:
         """One below the other, each with its run's scene, method and seed in front."""

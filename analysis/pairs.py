@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,8 +41,12 @@ def pair_runs(runs: Sequence[Run], scene: str, better: str, worse: str) -> list[
     if not shared:
         return []
     methods = by_way[min(shared, key=lambda way: (len(way), way))]
-    seeds = sorted(methods[better].keys() & methods[worse].keys())
-    return [Pair(methods[better][seed], methods[worse][seed]) for seed in seeds]
+    return pair_by_seed(methods[better], methods[worse])
+
+
+def pair_by_seed(better: Mapping[int, Run], worse: Mapping[int, Run]) -> list[Pair]:
+    """Runs by their seeds, paired where both methods have the seed, in order."""
+    return [Pair(better[seed], worse[seed]) for seed in sorted(better.keys() & worse.keys())]
 
 
 def _other_overrides(run: Run) -> tuple[str, ...]:

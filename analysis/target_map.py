@@ -63,8 +63,10 @@ def windows(run: Run, plane: str = "scene") -> list[Window]:
         position, on a grid whose cells hold `PATCHES_PER_CELL` of the map's patches on average
     """
     maps = read_records(run.folder / "target_map.bin")
+    if maps is None:
+        return []
     trace = read_chain_trace(run)
-    if maps is None or trace is None or trace.state is None:
+    if trace is None or trace.state is None:
         return []
     patches = maps["target"][0].size
     cells = maps["target"].shape[1] if plane == "scene" else isqrt(patches // PATCHES_PER_CELL)

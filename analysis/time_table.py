@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from analysis.claim_tables import format_time_ratio
 from analysis.methods import methods_in_order, title
-from analysis.pairs import Pair
+from analysis.pairs import pair_by_seed
 from analysis.runs import Run
 from analysis.speedup import time_ratio
 from analysis.tables import Cell, Table
@@ -23,16 +23,12 @@ def time_table(runs: Sequence[Run]) -> Table:
         of_scene = [run for run in runs if run.scene == scene]
         baseline, *others = methods_in_order(of_scene)
         for method in others:
-            pairs = _pair(of_scene, method, baseline)
-            if pairs:
+            if pairs := pair_by_seed(_by_seed(of_scene, method), _by_seed(of_scene, baseline)):
                 ratio = format_time_ratio(time_ratio(pairs))
                 rows.append((Cell(scene), Cell(title(method)), Cell(title(baseline)), Cell(ratio)))
     columns = ("scene", "method", "baseline", "baseline's time / method's time")
     return Table("Run time to equal error", columns, tuple(rows), 3)
 
 
-def _pair(runs: Sequence[Run], better: str, worse: str) -> list[Pair]:
-    ours, theirs = (
-        {run.seed: run for run in runs if run.method == method} for method in (better, worse)
-    )
-    return [Pair(ours[seed], theirs[seed]) for seed in sorted(ours.keys() & theirs.keys())]
+def _by_seed(runs: Sequence[Run], method: str) -> dict[int, Run]:
+    return {run.seed: run for run in runs if run.method == method}

@@ -12,9 +12,9 @@ from scipy.optimize import brentq
 
 from analysis.exploration_map.runs import TAIL, UNIFORM, run_time, scoring_cost
 from analysis.speedup import time_to_stay_below
+from analysis.statistics import LEVEL
 
 RESAMPLES = 400
-LEVEL = 0.95
 SMOOTHED = 3
 """Neighbouring evaluations that a point of a curve is the mean of; training is noisy."""
 MOST_SCORING = 1000.0

@@ -63,9 +63,8 @@ def train(setting: Setting, method: Method, seed: int, plan: Plan) -> Iterator[d
     optimizer = module.configure_optimizers()
     # There is no trainer that would know the optimiser.
     module.optimizers = lambda **_: optimizer  # type: ignore[method-assign,assignment]
-    scored_batches, lit = 0, 0.0
+    lit = 0.0
     for step, batch in enumerate(islice(stream, plan.steps), start=1):
-        scored_batches += batch.current is not None
         lit += renderer.weights(batch.patches.scene_vector).sum(dim=1).mean().item()
         outputs = module.training_step(batch, step)
         optimizer.zero_grad()
@@ -79,7 +78,7 @@ def train(setting: Setting, method: Method, seed: int, plan: Plan) -> Iterator[d
                 "seed": seed,
                 "step": step,
                 "generated_batches": stream.counters.generated_batches,
-                "scored_batches": scored_batches,
+                "scored_batches": stream.counters.scored_batches,
                 "lit": lit / step,
                 **test_set.errors(module.network),
             }

@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ngi.durable import full_disk_named
+from ngi.learn.growing_file import GrowingFile
 
 
-class RecordLog:
+class RecordLog(GrowingFile[BinaryIO]):
     """Records of equal size with an ascending `step`, appended to a file.
 
     The first line is JSON: `description`, and `fields`, a list of name, NumPy type and shape. The
@@ -29,9 +30,8 @@ class RecordLog:
     """
 
     def __init__(self, path: Path, *, description: str) -> None:
-        self.path = path
+        super().__init__(path)
         self._description = description
-        self._stream: BinaryIO | None = None
         self._dtype = np.dtype([])
 
     def append(self, record: Mapping[str, ArrayLike]) -> None:
@@ -47,13 +47,6 @@ class RecordLog:
             )
         with full_disk_named(self.path):
             self._stream.write(b"".join(array.tobytes() for array in arrays.values()))
-
-    def flush(self) -> None:
-        """Brings every record to the disk. Raises OSError, with what to do, where that is full."""
-        if self._stream is not None:
-            with full_disk_named(self.path):
-                self._stream.flush()
-                os.fsync(self._stream.fileno())
 
     def keep_until(self, step: int) -> None:
         """Drops records after `step`: what a run did after its last checkpoint is done again."""
@@ -71,12 +64,6 @@ class RecordLog:
                 good = (steps <= step) & (np.diff(steps, prepend=-1) > 0)
                 size = start + dtype.itemsize * int(np.logical_and.accumulate(good).sum())
         os.truncate(self.path, size)
-
-    def close(self) -> None:
-        stream, self._stream = self._stream, None
-        if stream is not None:
-            with full_disk_named(self.path):
-                stream.close()
 
     def _open(self, dtype: np.dtype) -> None:
         if self.path.exists():

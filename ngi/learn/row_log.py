@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import csv
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TextIO
 
 from ngi.durable import full_disk_named
+from ngi.learn.growing_file import GrowingFile
 
 
-class RowLog:
+class RowLog(GrowingFile[TextIO]):
     """Rows with a `step` column, appended to a CSV file.
 
     The columns are those of the file, or else of the first row; values missing later stay empty.
@@ -19,23 +19,15 @@ class RowLog:
     """
 
     def __init__(self, path: Path) -> None:
-        self.path = path
-        self._stream: TextIO | None = None
+        super().__init__(path)
         self._writer: csv.DictWriter[str] | None = None
 
     def append(self, row: Mapping[str, object]) -> None:
-        if self._writer is None:
+        if self._stream is None:
             self._open(list(row))
         assert self._writer is not None
         with full_disk_named(self.path):
             self._writer.writerow(row)
-
-    def flush(self) -> None:
-        """Brings every row to the disk. Raises OSError, with what to do, where that is full."""
-        if self._stream is not None:
-            with full_disk_named(self.path):
-                self._stream.flush()
-                os.fsync(self._stream.fileno())
 
     def keep_until(self, step: int) -> None:
         """Drops rows after `step`: what a run did after its last checkpoint is done again."""
@@ -57,12 +49,6 @@ class RowLog:
         temporary = self.path.with_name(self.path.name + ".tmp")
         temporary.write_text("".join(kept))
         temporary.replace(self.path)
-
-    def close(self) -> None:
-        stream, self._stream, self._writer = self._stream, None, None
-        if stream is not None:
-            with full_disk_named(self.path):
-                stream.close()
 
     def _open(self, columns: list[str]) -> None:
         continued = self.path.exists() and self.path.stat().st_size > 0
