@@ -188,16 +188,13 @@ def _distances(runs: Sequence[Run], styles: Styles) -> Figure:
                 left.plot(seconds, run["distance"], marker="o", ms=2.5, label=label, **shared)
                 left.plot(seconds, run["floor"], ":", color=colour, alpha=0.6)
                 left.plot(seconds, run["uniform_distance"], "--", color=colour, alpha=0.6)
-                # Where the target is nearly uniform nothing can be told, and nothing is shown.
-                known = run[run["excess_error"] < np.maximum(1, run["excess"].abs() / 2)]
-                points = known[["run_seconds", "excess", "excess_error"]].to_numpy().T
+                points = run[["run_seconds", "gain", "gain_error"]].to_numpy().T
                 right.errorbar(*points, marker="o", ms=2.5, **shared)
+                right.plot(seconds, run["gain_of_target"], ":", color=colour, alpha=0.6)
         left.set_title(f"distance from the target density, {name}", fontsize=9, loc="left")
-        right.set_title("squared, by that of uniform: 0 follows the target", fontsize=9, loc="left")
-        for level in (0, 1):
-            right.axhline(level, color="#666666", linewidth=0.8)
+        right.set_title("target density where they stood, 1: uniform", fontsize=9, loc="left")
+        right.axhline(1, color="#666666", linewidth=0.8)
         left.set_ylim(bottom=0)
-        right.set_yscale("symlog", linthresh=1)
     for axes in rows[-1]:
         axes.set_xlabel("run time in seconds")
     grey = {"color": "#666666"}

@@ -35,8 +35,9 @@ COLUMNS = (
     "distance",
     "floor",
     "uniform_distance",
-    "excess",
-    "excess_error",
+    "gain",
+    "gain_error",
+    "gain_of_target",
 )
 
 
@@ -115,11 +116,12 @@ def histogram_distances(runs: Sequence[Run], plane: str = "scene") -> pd.DataFra
     floor: expected distance of as many independent states drawn from the target density itself.
         Those of a chain are correlated, so that even one that follows its target stays above it.
     uniform_distance: expected distance of as many uniformly drawn independent states
-    excess: squared L2 distance from the target density, without what the number of states and
-        their correlation add, by that of the uniform density: 0 for chains that follow the target,
-        1 for uniform sampling, more for chains that are farther from it than that. Unlike the
-        distance it can be compared between samplers and over time.
-    excess_error: its standard error; large where the density is nearly uniform
+    gain: mean target density where the chains stood, by its mean over the hypercube: 1 for uniform
+        sampling. Neither the number of states nor their correlation adds to it, so that it tells
+        something where the target is nearly uniform and the distance does not.
+    gain_error: its standard error, from the chains' own gains
+    gain_of_target: that of independent states of the target density; chains above it are even more
+        often where it is high
     """
     rows = []
     for run in runs:
@@ -133,7 +135,7 @@ def histogram_distances(runs: Sequence[Run], plane: str = "scene") -> pd.DataFra
                     float(_distances(counts, window.density)),
                     _expected_distance(window.density, window.density, states),
                     _expected_distance(even, window.density, states),
-                    *_excess(window),
+                    *_gain(window),
                 )
             )
     return pd.DataFrame(rows, columns=list(COLUMNS))
@@ -152,24 +154,9 @@ def _expected_distance(drawn_from: np.ndarray, density: np.ndarray, states: int)
     return float(_distances(counts.reshape(-1, *density.shape), density).mean())
 
 
-def _excess(window: Window) -> tuple[float, float]:
-    """Squared distance of the chains' density from the target's, by that of a uniform density.
-
-    With its standard error (jackknife over chains). Products of two different chains are averaged,
-    which know nothing of each other, so that neither the number of a chain's states nor their
-    correlation adds to it.
-    """
-    chains = len(window.counts)
-    if chains < 3:
-        return np.nan, np.nan
-    target = (window.density * window.density.size).ravel()
-    counts = window.counts.reshape(chains, -1)
-    difference = counts / counts.mean(axis=1, keepdims=True) - target
-    own = np.square(difference).sum(axis=1)
-    total = difference.sum(axis=0)
-    squared = (total @ total - own.sum()) / (chains * (chains - 1))
-    others = np.square(total - difference).sum(axis=1) - (own.sum() - own)
-    without_one = others / ((chains - 1) * (chains - 2))
-    error = np.sqrt((chains - 1) * without_one.var())
-    uniform = np.square(1 - target).sum()
-    return (float(squared / uniform), float(error / uniform)) if uniform > 0 else (np.nan, np.nan)
+def _gain(window: Window) -> tuple[float, float, float]:
+    """The chains', its standard error, and the target's."""
+    relative = window.density * window.density.size
+    gains = (window.counts * relative).sum(axis=(1, 2)) / window.counts.sum(axis=(1, 2))
+    error = gains.std(ddof=1) / np.sqrt(len(gains)) if len(gains) > 1 else np.nan
+    return float(gains.mean()), float(error), float(np.square(relative).mean())

@@ -1,6 +1,7 @@
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from analysis.runs import Run
@@ -42,19 +43,31 @@ def test_the_windows_hold_the_states_since_the_last_map(tmp_path: Path) -> None:
     np.testing.assert_allclose(second.counts.sum(axis=(0, 1)) / 2400, 1 / CELLS, atol=0.03)
 
 
+SQUARES = np.arange(1.0, CELLS + 1) ** 2
+FOLLOWED = CELLS * (SQUARES @ SQUARES) / SQUARES.sum() ** 2
+"""Mean of DENSITY over states of DENSITY, by its mean over uniform ones: 8 Σ i⁴ / (Σ i²)²."""
+
+
 @pytest.mark.parametrize(
-    ("density", "excess"),
-    [(DENSITY, 0.0), (np.ones((CELLS, CELLS)), 1.0)],
-    ids=["target", "uniform"],
+    ("density", "gain"),
+    [
+        (DENSITY, FOLLOWED),
+        (np.ones((CELLS, CELLS)), 1.0),
+        (DENSITY[::-1], CELLS * (SQUARES @ SQUARES[::-1]) / SQUARES.sum() ** 2),
+    ],
+    ids=["target", "uniform", "opposite"],
 )
-def test_states_of_the_target_are_at_0_and_uniform_ones_at_1(
-    tmp_path: Path, density: np.ndarray, excess: float
+def test_the_gain_is_the_target_density_that_the_states_have(
+    tmp_path: Path, density: np.ndarray, gain: float
 ) -> None:
     runs = [make(tmp_path / str(seed), density, seed=seed) for seed in range(4)]
     table = histogram_distances(runs)
     assert table["step"].tolist() == STEPS * 4
     assert set(table["scene"]) == {"mirror"}
-    assert table["excess"].mean() == pytest.approx(excess, abs=0.03)
+    assert table["gain"].mean() == pytest.approx(gain, abs=0.03)
+    assert table["gain_of_target"].unique() == pytest.approx([FOLLOWED])
+    deviation = np.sqrt(np.square(table["gain"] - gain).mean())
+    assert 0.4 < deviation / table["gain_error"].mean() < 2
     assert (table["floor"] < table["uniform_distance"]).all()
     first, second = (table[table["step"] == step] for step in STEPS)
     assert first["floor"].iloc[0] > second["floor"].iloc[0]  # of fewer states
@@ -77,12 +90,12 @@ def test_patch_positions_are_compared_on_their_own(tmp_path: Path) -> None:
     np.testing.assert_allclose(
         last.counts.sum(axis=(0, 2)) / last.counts.sum(), 1 / cells, atol=0.03
     )
-    assert histogram_distances([run], "patch")["excess"].iloc[-1] == pytest.approx(1, abs=0.1)
+    assert histogram_distances([run], "patch")["gain"].iloc[-1] == pytest.approx(1, abs=0.1)
 
 
-def test_correlation_within_a_chain_is_no_excess(tmp_path: Path) -> None:
+def test_correlation_within_a_chain_is_no_gain(tmp_path: Path) -> None:
     """Chains that hold every state of the target for ten batches: fewer, but the same states."""
-    excess, error, distance, floor = [], [], [], []
+    tables = []
     for seed in range(6):
         run = make(tmp_path / str(seed), DENSITY, seed=seed)
         moved = np.zeros((STEPS[-1], CHAINS), dtype=bool)
@@ -90,16 +103,11 @@ def test_correlation_within_a_chain_is_no_excess(tmp_path: Path) -> None:
         (run.folder / "chains.bin").unlink()
         position = states_from(DENSITY, moved.size, seed).reshape(-1, CHAINS, 4)
         write_trace(run.folder, position, moved)
-        table = histogram_distances([run])
-        for values, column in zip(
-            (excess, error, distance, floor),
-            ("excess", "excess_error", "distance", "floor"),
-            strict=True,
-        ):
-            values.extend(table[column])
-    assert np.mean(distance) > 1.5 * np.mean(floor)  # what the plain distance would say
-    assert np.mean(excess) == pytest.approx(0, abs=0.1)
-    assert 0.5 < np.std(excess) / np.mean(error) < 2
+        tables.append(histogram_distances([run]))
+    table = pd.concat(tables)
+    assert table["distance"].mean() > 1.5 * table["floor"].mean()  # what the distance would say
+    assert table["gain"].mean() == pytest.approx(FOLLOWED, abs=0.05)
+    assert 0.5 < table["gain"].std() / table["gain_error"].mean() < 2
 
 
 @pytest.mark.parametrize("file", ["chains.bin", "target_map.bin"])
