@@ -106,11 +106,17 @@ def _step_seconds(
         stream = build_stream(config, renderer=stand_in, clock=clock, patches=run.patches)
         module = build_module(config, renderer=stand_in, target=stream.sampler.target, clock=clock)
         timer = StepTimer(clock=clock, scored=scored, seconds=SECONDS)
+        guard = learn.StepGuard(stream=stream, report=Path(folder) / "refused_step.pt")
         feedback = learn.SamplerFeedback(
-            stream=stream, clock=clock, run_clock=clock, folder=run, tracker=learn.Local()
+            stream=stream,
+            clock=clock,
+            run_clock=clock,
+            folder=run,
+            tracker=learn.Local(),
+            guard=guard,
         )
         trainer = instantiate(config.trainer)(
-            default_root_dir=folder, max_steps=-1, callbacks=[feedback, timer]
+            default_root_dir=folder, max_steps=-1, callbacks=[guard, feedback, timer]
         )
         with closing(run):
             trainer.fit(module, learn.ExplorationDataModule(stream=stream))

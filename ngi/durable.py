@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import io
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 PARTIAL_SUFFIX = ".partial"
 """Of files that are being written; one that is left was cut short and means nothing."""
@@ -43,6 +45,17 @@ def write_atomically(path: Path, content: bytes | memoryview) -> None:
     except OSError:
         partial.unlink(missing_ok=True)
         raise
+
+
+def write_tensors(path: Path, content: dict[str, Any]) -> None:
+    """`write_atomically` of what `torch.load` reads; the folder is made where it is missing."""
+    import torch
+
+    # torch.save hides the OSError of a full disk behind an internal RuntimeError: go by memory.
+    buffer = io.BytesIO()
+    torch.save(content, buffer)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_atomically(path, buffer.getbuffer())
 
 
 def _fsync_folder(folder: Path) -> None:

@@ -69,6 +69,9 @@ def train(setting: Setting, method: Method, seed: int, plan: Plan) -> Iterator[d
         outputs = module.training_step(batch, step)
         optimizer.zero_grad()
         outputs["loss"].backward()
+        norm = learn.gradient_norm(module.parameters())
+        if not norm <= learn.LARGEST_NORM:
+            raise FloatingPointError(f"step {step} of {setting}, {method}: gradient norm {norm}")
         optimizer.step()
         stream.feedback(outputs["feedback"])
         if step % (plan.steps // plan.evaluations) == 0:

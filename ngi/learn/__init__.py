@@ -1,6 +1,6 @@
 """Where exploration, rendering, reuse and the network meet."""
 
-from ngi.learn.batch import Batch, Feedback
+from ngi.learn.batch import Batch, Counters, Feedback
 from ngi.learn.budget import Budget
 from ngi.learn.callbacks import SamplerFeedback, callbacks
 from ngi.learn.checkpoint import AtomicCheckpointIO, prepare_resume
@@ -14,18 +14,21 @@ from ngi.learn.recorder import Recorder
 from ngi.learn.row_log import RowLog
 from ngi.learn.run_folder import RunFolder
 from ngi.learn.scorer import Scorer
+from ngi.learn.step_guard import LARGEST_NORM, StepGuard, gradient_norm
 from ngi.learn.stream import TrainingStream
 from ngi.learn.target_map import TargetMap
 from ngi.learn.tracker import Local, Tracker, WeightsAndBiases
 from ngi.reuse import PatchArchive
 
 __all__ = [
+    "LARGEST_NORM",
     "AtomicCheckpointIO",
     "Batch",
     "Budget",
     "Component",
     "CostFile",
     "Costs",
+    "Counters",
     "ExplorationDataModule",
     "Feedback",
     "IlluminationModule",
@@ -40,12 +43,14 @@ __all__ = [
     "RunFolder",
     "SamplerFeedback",
     "Scorer",
+    "StepGuard",
     "TargetMap",
     "Tracker",
     "TrainingStream",
     "WeightsAndBiases",
     "callbacks",
     "components",
+    "gradient_norm",
     "prepare_resume",
     "seeded",
 ]

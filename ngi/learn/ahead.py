@@ -62,6 +62,17 @@ class ProposalsAhead:
             log_radiance=rendered.log_radiance,
         )
 
+    def unusable(self) -> str | None:
+        """Which of the patches hold NaN or Inf, and how to render them again; None for none."""
+        rendered = self.result()
+        broken = ~(_finite(rendered.buffers) & _finite(rendered.log_radiance))
+        if not broken.any():
+            return None
+        return (
+            f"NaN or Inf in the patches of the states {self.proposals.position[broken].tolist()} "
+            f"(v, then patch position), resolution {self.resolution}, seed {self.seed}"
+        )
+
     def state_dict(self) -> dict[str, Any]:
         """What has to be rendered, not what has been: that is rendered again."""
         return {
@@ -79,3 +90,8 @@ class ProposalsAhead:
             resolution=state["resolution"],
             seed=state["seed"],
         )
+
+
+def _finite(patches: torch.Tensor) -> torch.Tensor:
+    """[n] bool, of patches [n, …]."""
+    return patches.isfinite().flatten(1).all(dim=1).cpu()

@@ -55,6 +55,8 @@ class Counters:
     scored_batches: generated batches for which the chains' current states were scored too
     batches_postponed: how often stored patches were trained on because new ones were not rendered
         yet (`TrainingStream`'s `when_late`)
+    batches_refused: rendered batches that held NaN or Inf and were replaced by other proposals'
+    steps_refused: steps not taken because the loss or its gradient was not finite (`StepGuard`)
     """
 
     iteration: int = 0
@@ -65,6 +67,8 @@ class Counters:
     paths_traced: int = 0
     patches_repaired: int = 0
     patches_masked: int = 0
+    batches_refused: int = 0
+    steps_refused: int = 0
 
     def count_generated(self, rendered: RenderedPatches) -> None:
         """Adds one generated batch."""

@@ -18,6 +18,7 @@ from ngi.learn.clock import PhaseClock, RunClock
 from ngi.learn.lightning_api import Callback, LightningModule, Trainer
 from ngi.learn.recorder import Recorder
 from ngi.learn.run_folder import RunFolder
+from ngi.learn.step_guard import StepGuard
 from ngi.learn.stream import TrainingStream
 from ngi.learn.tracker import Tracker
 
@@ -40,12 +41,14 @@ class SamplerFeedback(Callback):
         run_clock: RunClock,
         folder: RunFolder,
         tracker: Tracker,
+        guard: StepGuard,
     ) -> None:
         self._stream = stream
         self._clock = clock
         self._run_clock = run_clock
         self._folder = folder
         self._tracker = tracker
+        self._guard = guard
         self._training: AbstractContextManager[None] | None = None
 
     def on_train_start(self, *_: Any) -> None:
@@ -66,6 +69,7 @@ class SamplerFeedback(Callback):
             "step": self._stream.counters.iteration,
             "run_seconds": round(self._run_clock.run_seconds, 4),
             "loss": loss,
+            "gradient_norm": self._guard.gradient_norm,
             **self._stream.log_row(),
         }
         self._folder.steps.append(row)
@@ -231,9 +235,16 @@ def callbacks(
 
     clock: the wall clock; run_clock: the one by which the budget ends, which may be the same
     """
+    guard = StepGuard(stream=stream, report=folder.path / "refused_step.pt")
     return [
+        guard,
         SamplerFeedback(
-            stream=stream, clock=clock, run_clock=run_clock, folder=folder, tracker=tracker
+            stream=stream,
+            clock=clock,
+            run_clock=run_clock,
+            folder=folder,
+            tracker=tracker,
+            guard=guard,
         ),
         PeriodicEvaluation(
             recorder=recorder, count=evaluations, budget=budget, stream=stream, run_clock=run_clock

@@ -68,22 +68,11 @@ class IlluminationModule(LightningModule):
             with self._scorer.watch(batch.patches, batch.current, self._optimizer()) as score:
                 losses, prediction = self._losses(batch.patches)
             feedback = Feedback(losses.detach(), *score(prediction, losses))
-        return {"loss": self._mean(losses), "feedback": feedback}
+        return {"loss": losses.mean(), "feedback": feedback}
 
     def _losses(self, patches: Patches) -> tuple[Tensor, Tensor]:
         prediction = self.network(patches.buffers, patches.scene_vector)
         return self.loss(prediction, patches.log_radiance), prediction
-
-    def _mean(self, losses: Tensor) -> Tensor:
-        loss = losses.mean()
-        if not torch.isfinite(loss):
-            raise FloatingPointError(
-                f"the loss is {loss.item()} at step {self.global_step} (per sample: "
-                f"{losses.tolist()}); the run stops before the weights are harmed. steps.csv shows "
-                "how it came to this; a lower optimizer.lr is the usual remedy (in a new folder: "
-                "it is another run)"
-            )
-        return loss
 
     def predict(self, buffers: Tensor, scene_vector: Tensor) -> Tensor:
         """One image: buffers [H, W, C] and v [D] to log1p radiance [H, W, 3] on the CPU."""

@@ -107,6 +107,8 @@ class Recorder:
             "paths_traced": counters.paths_traced,
             "patches_repaired": counters.patches_repaired,
             "patches_masked": counters.patches_masked,
+            "batches_refused": counters.batches_refused,
+            "steps_refused": counters.steps_refused,
             "non_finite_losses": self._stream.store.non_finite_losses,
             "scene_hash": self._folder.settings["scene"]["hash"],
             **evaluation.result(),

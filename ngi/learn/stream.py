@@ -9,6 +9,7 @@ step behind the network.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 from typing import Any
 
@@ -29,6 +30,11 @@ ENDLESS = 2**31
 sampler would run one step behind the network."""
 
 WHEN_LATE = ("wait", "reuse")
+
+REFUSED_IN_A_ROW = 10
+"""Batches with NaN or Inf after which the renderer, not a rare v, is to blame."""
+
+log = logging.getLogger(__name__)
 
 
 class TrainingStream(IterableDataset[Batch]):
@@ -218,9 +224,8 @@ class TrainingStream(IterableDataset[Batch]):
         return postponed
 
     def _generate(self, ahead: ProposalsAhead) -> Batch:
-        with self._clock.phase("render"):
-            rendered = ahead.result()
-        self.counters.count_generated(rendered)
+        ahead = self._usable(ahead)
+        self.counters.count_generated(ahead.result())
         with self._clock.phase("reuse"):
             ids = self.store.add(ahead.patches())
             patches = self.store.get(ids)  # in the precision of every later look at them
@@ -228,6 +233,25 @@ class TrainingStream(IterableDataset[Batch]):
             current = self.store.get(self._chains.patch) if score_current else None
         self.counters.scored_batches += score_current
         return Batch(patches, ids, generated=True, current=current)
+
+    def _usable(self, ahead: ProposalsAhead) -> ProposalsAhead:
+        """The proposals, rendered, or others where the patches of these hold NaN or Inf.
+
+        Raises FloatingPointError where others do not help.
+        """
+        for _ in range(REFUSED_IN_A_ROW):
+            with self._clock.phase("render"):
+                problem = ahead.unusable()
+            if problem is None:
+                return ahead
+            self.counters.batches_refused += 1
+            log.warning("%s; other patches are rendered instead", problem)
+            self._ahead = None
+            ahead = self._propose()
+        raise FloatingPointError(
+            f"{problem}, and in {REFUSED_IN_A_ROW - 1} batches before: the renderer gives no "
+            "usable patches of this scene"
+        )
 
     def _accept(self, batch: Batch, feedback: Feedback) -> None:
         assert self._ahead is not None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import zlib
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from ngi.durable import PARTIAL_SUFFIX, write_atomically
+from ngi.durable import PARTIAL_SUFFIX, write_tensors
 from ngi.reuse.compact import CompactPatches
 from ngi.reuse.store import PatchStore
 
@@ -92,7 +91,7 @@ class PatchArchive:
         """Writes the patches of these ids, of first … last - 1, and describes the file."""
         name = f"patches-{first:012d}-{last:012d}.pt"
         compact = store.get_compact(ids)
-        _write(self._folder / name, {"ids": ids, **compact.tensors()})
+        write_tensors(self._folder / name, {"ids": ids, **compact.tensors()})
         return {"name": name, "first": first, "last": last, "checksum": _checksum(ids, compact)}
 
     def _read(self, state: dict[str, Any]) -> Iterator[tuple[Tensor, CompactPatches]]:
@@ -104,14 +103,6 @@ class PatchArchive:
                 ids[wanted],
                 CompactPatches(**{n: t[wanted] for n, t in compact.tensors().items()}),
             )
-
-
-def _write(path: Path, content: dict[str, Tensor]) -> None:
-    # torch.save hides the OSError of a full disk behind an internal RuntimeError: go by memory.
-    buffer = io.BytesIO()
-    torch.save(content, buffer)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write_atomically(path, buffer.getbuffer())
 
 
 def _read_segment(path: Path, checksum: int) -> tuple[Tensor, CompactPatches]:

@@ -1,0 +1,231 @@
+"""What is not finite, at each place where it can come from, in real training on closed formulas."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+import torch
+from torch import Tensor
+
+from ngi.explore import LossTimesStep
+from ngi.learn import ExplorationDataModule, IlluminationModule, PhaseClock, StepGuard, seeded
+from ngi.learn.lightning_api import Callback, Trainer
+from ngi.learn.step_guard import LARGEST_NORM, REFUSED_IN_A_ROW
+from ngi.learn.stream import TrainingStream
+from ngi.models import L1Dssim, PixelGenerator
+from ngi.render import AnalyticRenderer, RenderedPatches
+from tests.learn.small_stream import make
+
+Disturbance = Callable[[int, Tensor], Tensor]
+"""(number of the step, from 1; what is computed) -> what is given on."""
+
+pytestmark = [  # as in ngi.learn.lightning_api, whose filters pytest takes away
+    pytest.mark.filterwarnings(f"ignore:{message}")
+    for message in (
+        "Your `IterableDataset` has `__len__` defined",
+        ".*does not have many workers",
+        r"`isinstance\(treespec, LeafSpec\)` is deprecated",
+    )
+]
+
+LOSS = L1Dssim(l1_weight=1.0, dssim_weight=1.0, window_size=5)
+
+
+@dataclass
+class OddLoss:
+    disturb: Disturbance
+    stream: TrainingStream | None = None
+
+    def __call__(self, prediction: Tensor, target: Tensor) -> Tensor:
+        step = 0 if self.stream is None else self.stream.counters.iteration + 1
+        return self.disturb(step, LOSS(prediction, target))
+
+
+class Feedback(Callback):
+    def __init__(self, stream: TrainingStream) -> None:
+        self.stream = stream
+        self.weights: list[Tensor] = []
+
+    def on_train_batch_end(self, _trainer, module, outputs, *_) -> None:
+        self.stream.feedback(outputs["feedback"])
+        self.weights.append(torch.cat([p.detach().flatten() for p in module.parameters()]))
+
+
+def unchanged(_step: int, values: Tensor) -> Tensor:
+    return values
+
+
+def train(
+    folder: Path,
+    steps: int,
+    *,
+    losses: Disturbance = unchanged,
+    gradient: Disturbance = unchanged,
+    renderer: AnalyticRenderer | None = None,
+    callbacks: Sequence[Callback] = (),
+) -> Feedback:
+    stream = make(folder, greedy=True, renderer=renderer)
+    module = IlluminationModule(
+        network=seeded(PixelGenerator, seed=0)(
+            layout=AnalyticRenderer(dimensions=3, patch_size=8).layout,
+            scene_dimensions=3,
+            hidden_features=8,
+            hidden_layers=2,
+        ),
+        loss=OddLoss(losses, stream),
+        optimizer=lambda parameters: torch.optim.Adam(parameters, lr=1e-2),
+        target=LossTimesStep(),
+        clock=PhaseClock(),
+    )
+    count = iter(range(1, steps + 1))
+    module.network.output_layer.weight.register_hook(lambda g: gradient(next(count), g))
+    feedback = Feedback(stream)
+    guard = StepGuard(stream=stream, report=folder / "refused_step.pt")
+    trainer = Trainer(
+        max_steps=steps,
+        accelerator="cpu",
+        logger=False,
+        enable_checkpointing=False,
+        enable_progress_bar=False,
+        enable_model_summary=False,
+        callbacks=[
+            guard,
+            feedback,
+            *callbacks,
+        ],
+    )
+    trainer.fit(module, ExplorationDataModule(stream=stream))
+    return feedback
+
+
+def at(step: int, value: float) -> Disturbance:
+    """One element becomes `value` at this step."""
+
+    def disturb(now: int, values: Tensor) -> Tensor:
+        if now != step:
+            return values
+        flat = values.flatten()
+        index = torch.arange(len(flat)) == 1
+        return torch.where(index, flat * 0 + value, flat).reshape(values.shape)
+
+    return disturb
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, 1e30, 1e20])
+def test_a_harmful_gradient_is_refused_and_named_and_training_goes_on(
+    tmp_path: Path, value: float, caplog: pytest.LogCaptureFixture
+) -> None:
+    with caplog.at_level(logging.WARNING, logger="ngi"):
+        feedback = train(tmp_path, 12, gradient=at(6, value))
+    assert feedback.stream.counters.steps_refused == 1
+    assert "step 6 is not taken" in caplog.text
+    assert "network.output_layer.weight" in caplog.text
+    assert torch.equal(feedback.weights[5], feedback.weights[4])
+    assert all(not torch.equal(a, b) for a, b in pairwise(feedback.weights[5:]))
+    assert feedback.weights[-1].isfinite().all()
+    assert not (tmp_path / "refused_step.pt").exists()
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_a_loss_that_is_not_finite_is_refused_and_names_its_patch(
+    tmp_path: Path, value: float, caplog: pytest.LogCaptureFixture
+) -> None:
+    with caplog.at_level(logging.WARNING, logger="ngi"):
+        feedback = train(tmp_path, 8, losses=at(2, value))
+    assert feedback.stream.counters.steps_refused == 1
+    assert f"the loss of samples [1] (patches [5] of the store) is [{value}]" in caplog.text
+    assert feedback.stream.store.non_finite_losses == 1
+    assert feedback.weights[-1].isfinite().all()
+
+
+def test_a_large_gradient_that_adam_can_hold_is_taken(tmp_path: Path) -> None:
+    feedback = train(tmp_path, 4, gradient=at(2, LARGEST_NORM / 4))
+    assert feedback.stream.counters.steps_refused == 0
+    assert not torch.equal(feedback.weights[1], feedback.weights[0])
+
+
+def test_refusals_in_a_row_stop_the_run_with_what_does_the_last_one_again(tmp_path: Path) -> None:
+    def always(_: int, losses: Tensor) -> Tensor:
+        return losses / 0
+
+    with pytest.raises(FloatingPointError, match=rf"the {REFUSED_IN_A_ROW}th in a row.*\.pt"):
+        train(tmp_path, 30, losses=always)
+    report = torch.load(tmp_path / "refused_step.pt", weights_only=True)
+    assert report["step"] == REFUSED_IN_A_ROW
+    network = PixelGenerator(
+        layout=AnalyticRenderer(dimensions=3, patch_size=8).layout,
+        scene_dimensions=3,
+        hidden_features=8,
+        hidden_layers=2,
+    )
+    weights = {name.removeprefix("network."): w for name, w in report["weights"].items()}
+    network.load_state_dict(weights)
+    patches = report["patches"]
+    losses = OddLoss(always)(
+        network(patches["buffers"], patches["scene_vector"]), patches["log_radiance"]
+    )
+    assert torch.equal(losses, report["losses"])
+    assert report["optimizer"]["state"] == {}  # no step was taken
+
+
+def test_moments_that_hold_nan_never_reach_the_weights(tmp_path: Path) -> None:
+    class Poison(Callback):
+        def on_train_batch_start(self, trainer, _module, *_) -> None:
+            for state in list(trainer.optimizers[0].state.values())[:1]:
+                state["exp_avg_sq"].flatten()[0] = math.nan
+
+    with pytest.raises(FloatingPointError, match="Adam's moments hold NaN or Inf"):
+        train(tmp_path, 30, callbacks=[Poison()])
+    report = torch.load(tmp_path / "refused_step.pt", weights_only=True)
+    assert report["step"] == 1 + REFUSED_IN_A_ROW  # before the first there are no moments
+    assert all(weights.isfinite().all() for weights in report["weights"].values())
+
+
+def test_refusals_with_steps_between_them_do_not_stop_the_run(tmp_path: Path) -> None:
+    def every_second(step: int, losses: Tensor) -> Tensor:
+        return losses * (math.nan if step % 2 else 1)
+
+    feedback = train(tmp_path, 3 * REFUSED_IN_A_ROW, losses=every_second)
+    assert feedback.stream.counters.steps_refused == 1.5 * REFUSED_IN_A_ROW
+
+
+class BrokenRenderer(AnalyticRenderer):
+    """NaN in a patch of the calls that are listed; Inf in a buffer of all where `always`."""
+
+    def __init__(self, *, calls: set[int] | None) -> None:
+        super().__init__(dimensions=3, patch_size=8)
+        self._calls = calls
+        self._count = 0
+
+    def render_patches(self, states: Tensor, *, resolution: int, seed: int) -> RenderedPatches:
+        rendered = super().render_patches(states, resolution=resolution, seed=seed)
+        self._count += 1
+        if self._calls is None:
+            rendered.buffers[:, 0, 0, 0] = math.inf
+        elif self._count in self._calls:
+            rendered.log_radiance[1, 2, 3] = math.nan
+        return replace(rendered)
+
+
+def test_patches_that_are_not_finite_are_replaced_and_named(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    with caplog.at_level(logging.WARNING, logger="ngi"):
+        feedback = train(tmp_path, 10, renderer=BrokenRenderer(calls={2, 3}))
+    assert feedback.stream.counters.batches_refused == 2
+    assert feedback.stream.counters.steps_refused == 0
+    assert caplog.text.count("NaN or Inf in the patches of the states [[0.") == 2
+    assert "resolution 24, seed " in caplog.text
+    store = feedback.stream.store
+    assert store.get(store.ids).log_radiance.isfinite().all()
+
+
+def test_a_renderer_that_gives_nothing_finite_stops_the_run(tmp_path: Path) -> None:
+    with pytest.raises(FloatingPointError, match="9 batches before: the renderer gives no usable"):
+        train(tmp_path, 5, renderer=BrokenRenderer(calls=None))
