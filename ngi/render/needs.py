@@ -51,7 +51,8 @@ def _of_materials(scene: VariableScene, buffer: str, constants: set[object]) -> 
         return BufferNeed(buffer, True, "a variable changes it")
     if len(constants) > 1 or None in constants:
         return BufferNeed(buffer, True, "surfaces differ in it")
-    return BufferNeed(buffer, False, f"it is {constants.pop()} everywhere")
+    where = f"it is {constants.pop()} everywhere" if constants else "there is no surface"
+    return BufferNeed(buffer, False, where)
 
 
 def _emission(scene: VariableScene) -> BufferNeed:

@@ -152,3 +152,12 @@ def test_the_albedo_of_glass_is_the_transmittance_that_a_variable_sets(scene) ->
     buffers = renderer.image_buffers(torch.tensor([0.5]), resolution=9)
     albedo = buffers[4, 4, renderer.layout.slice("albedo")]
     torch.testing.assert_close(albedo, torch.tensor([0.5, 1.0, 1.0]))
+
+
+def test_a_scene_of_sky_alone_has_no_materials_to_tell_of(scene) -> None:
+    sky = '<emitter type="constant" id="sky"/></scene>'
+    xml = SCENE[: SCENE.index("<bsdf")] + sky
+    found = needs(scene("{object: sky, property: intensity, minimum: 0.5, maximum: 2}", xml=xml))
+    assert found["albedo"].why == "there is no surface"
+    assert not found["albedo"].needed
+    assert found["emission"].needed

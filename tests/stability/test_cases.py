@@ -1,0 +1,56 @@
+"""The cases that take no long: those of training on two samplers, those of rendering on LLVM."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from ngi.learn import StepGuard
+from ngi.stability.case import Case, Conditions, attempt
+from ngi.stability.groups import GROUPS
+
+pytestmark = [  # as in ngi.learn.lightning_api, whose filters pytest takes away
+    pytest.mark.filterwarnings(f"ignore:{message}")
+    for message in (
+        "Your `IterableDataset` has `__len__` defined",
+        ".*does not have many workers",
+        r"`isinstance\(treespec, LeafSpec\)` is deprecated",
+    )
+]
+
+SAMPLERS = ("uniform", "mcmc_loss_step")
+
+
+def quick() -> Iterator[object]:
+    for group, cases in GROUPS.items():
+        for case in cases:
+            for conditions in case.conditions():
+                if (
+                    conditions.sampler in (*SAMPLERS, None)
+                    and conditions.precision in ("fp32", None)
+                    and conditions.backend in ("llvm", None)
+                    and conditions.scene in ("sphere-caustic", "mirror", None)
+                    and "dimensions" not in case.name  # takes seconds
+                    and "learning rate" not in case.name
+                ):
+                    name = "-".join(filter(None, (group, case.name, conditions.sampler)))
+                    yield pytest.param(group, case, conditions, id=f"{name}-{conditions.scene}")
+
+
+@pytest.mark.parametrize(("group", "case", "conditions"), list(quick()))
+def test_the_program_does_what_is_documented(
+    group: str, case: Case, conditions: Conditions
+) -> None:
+    row = attempt(group, case, conditions)
+    assert row.outcome.passed, row.columns()
+
+
+@pytest.mark.parametrize("name", ["NaN in a loss", "NaN in a gradient", "NaN in Adam's moments"])
+def test_without_the_guard_these_cases_fail(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    case = next(case for case in GROUPS["training"] if case.name == name)
+    conditions = Conditions(sampler="uniform", precision="fp32")
+    monkeypatch.setattr("ngi.learn.step_guard.LARGEST_NORM", float("inf"))
+    monkeypatch.setattr(StepGuard, "on_before_optimizer_step", lambda *_: None)
+    monkeypatch.setattr(StepGuard, "on_train_batch_end", lambda *_: None)
+    assert not attempt("training", case, conditions).outcome.passed
