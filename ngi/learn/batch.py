@@ -57,6 +57,7 @@ class Counters:
         yet (`TrainingStream`'s `when_late`)
     batches_refused: rendered batches that held NaN or Inf and were replaced by other proposals'
     steps_refused: steps not taken because the loss or its gradient was not finite (`StepGuard`)
+    steps_scaled: steps whose gradient was scaled down, being far larger than the average
     """
 
     iteration: int = 0
@@ -69,6 +70,7 @@ class Counters:
     patches_masked: int = 0
     batches_refused: int = 0
     steps_refused: int = 0
+    steps_scaled: int = 0
 
     def count_generated(self, rendered: RenderedPatches) -> None:
         """Adds one generated batch."""

@@ -109,6 +109,7 @@ class Recorder:
             "patches_masked": counters.patches_masked,
             "batches_refused": counters.batches_refused,
             "steps_refused": counters.steps_refused,
+            "steps_scaled": counters.steps_scaled,
             "non_finite_losses": self._stream.store.non_finite_losses,
             "scene_hash": self._folder.settings["scene"]["hash"],
             **evaluation.result(),

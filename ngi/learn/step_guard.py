@@ -4,6 +4,9 @@ A gradient that holds NaN or Inf would take the weights with it, and one whose s
 float32 would fill Adam's second moment with Inf, so that these weights never move again. The norm
 of the whole gradient tells both; a loss that is not finite need not have such a gradient. Moments
 that hold NaN or Inf all the same (from outside, say) would harm the weights too.
+
+A finite gradient can do harm as well: one 1e4 times as large as the others makes Adam's second
+moment so large that the next ten thousand steps are next to none. It is scaled down.
 """
 
 from __future__ import annotations
@@ -28,6 +31,12 @@ log = logging.getLogger(__name__)
 LARGEST_NORM = math.sqrt(torch.finfo(torch.float32).max)
 """Of a gradient whose squares Adam can hold: 1.8e19."""
 
+OUTLIER = 100.0
+"""Times the average norm, from which on a gradient is scaled down to the average."""
+
+AVERAGED = 100
+"""Steps that the average, of the norms' logarithms, goes back."""
+
 REFUSED_IN_A_ROW = 10
 """Steps after which no other batch will help: the run stops."""
 
@@ -41,11 +50,13 @@ def gradient_norm(parameters: Iterable[nn.Parameter]) -> float:
 class StepGuard(Callback):
     """Takes back the gradient of a step that would harm weights or moments: Adam then does nothing.
 
-    Sampler, store and policy learn of such a step as of any other; they know how to deal with
+    A gradient far larger than the average is scaled down to it, and the step is taken.
+
+    Sampler, store and policy learn of such steps as of any other; they know how to deal with
     losses that are not finite. After `REFUSED_IN_A_ROW` of them the run stops, and `report` holds
     what it takes to do the last one again.
 
-    stream: its counter `steps_refused` counts
+    stream: its counters `steps_refused` and `steps_scaled` count
     report: file for the weights, Adam's moments, the batch and its losses; `torch.load` reads it
     """
 
@@ -54,6 +65,13 @@ class StepGuard(Callback):
         self._stream = stream
         self._report = report
         self._in_a_row = 0
+        self._log_norm: float | None = None  # average of the logarithms
+
+    def state_dict(self) -> dict[str, Any]:
+        return {"log_norm": self._log_norm}
+
+    def load_state_dict(self, state_dict: dict[str, Any]) -> None:
+        self._log_norm = state_dict["log_norm"]
 
     def on_before_backward(self, _trainer: Trainer, _module: LightningModule, loss: Tensor) -> None:
         self._loss = loss.detach()  # not looked at yet: a GPU would be waited for
@@ -66,6 +84,7 @@ class StepGuard(Callback):
         moments_usable = math.isfinite(_largest_moment(optimizer))
         self._harmless = gradient_usable and moments_usable and math.isfinite(self._loss)
         if self._harmless:
+            self._scale_down(module)
             return
         self._unusable = [name for name, p in module.named_parameters() if not _usable(p.grad)]
         self._moments_usable = moments_usable
@@ -91,6 +110,19 @@ class StepGuard(Callback):
             f"Weights, moments and batch are in {self._report}. The usual remedy is a lower "
             "optimizer.lr, in a new folder, since that is another run"
         )
+
+    def _scale_down(self, module: LightningModule) -> None:
+        if self.gradient_norm == 0:
+            return
+        log_norm = math.log(self.gradient_norm)
+        average = log_norm if self._log_norm is None else self._log_norm
+        self._log_norm = average + (log_norm - average) / AVERAGED
+        if log_norm - average <= math.log(OUTLIER):
+            return
+        self._stream.counters.steps_scaled += 1
+        for parameter in module.parameters():
+            if parameter.grad is not None:
+                parameter.grad.mul_(math.exp(average - log_norm))
 
     def _cause(self, losses: Tensor, batch: Batch) -> str:
         broken = (~losses.isfinite()).nonzero().flatten().tolist()

@@ -144,10 +144,31 @@ def test_a_loss_that_is_not_finite_is_refused_and_names_its_patch(
     assert feedback.weights[-1].isfinite().all()
 
 
-def test_a_large_gradient_that_adam_can_hold_is_taken(tmp_path: Path) -> None:
-    feedback = train(tmp_path, 4, gradient=at(2, LARGEST_NORM / 4))
-    assert feedback.stream.counters.steps_refused == 0
-    assert not torch.equal(feedback.weights[1], feedback.weights[0])
+def test_a_large_gradient_is_scaled_down_to_the_average_and_taken(tmp_path: Path) -> None:
+    squares: list[Tensor] = []
+
+    class Moments(Callback):
+        def on_train_batch_end(self, trainer, *_) -> None:
+            states = trainer.optimizers[0].state.values()
+            squares.append(sum((state["exp_avg_sq"].sum() for state in states), torch.zeros(())))
+
+    feedback = train(tmp_path, 6, gradient=at(4, LARGEST_NORM / 4), callbacks=[Moments()])
+    counters = feedback.stream.counters
+    assert (counters.steps_refused, counters.steps_scaled) == (0, 1)
+    assert not torch.equal(feedback.weights[3], feedback.weights[2])
+    gained = squares[3] - 0.999 * squares[2]  # (1 - beta2) times the squared norm
+    first = squares[0]  # the average moves little in four steps
+    assert 0.3 < gained / first < 3
+
+
+def test_gradients_that_stay_large_are_taken_as_they_are_in_the_end(tmp_path: Path) -> None:
+    def larger(step: int, gradient: Tensor) -> Tensor:
+        return gradient * (1e6 if step > 5 else 1)
+
+    counters = train(tmp_path, 400, gradient=larger).stream.counters
+    # The average of logarithms follows by 1 / 100 per step: ln(100) = ln(1e6) 0.99^n.
+    expected = math.log(math.log(1e6) / math.log(100)) / -math.log(0.99)
+    assert counters.steps_scaled == pytest.approx(expected, abs=8)
 
 
 def test_refusals_in_a_row_stop_the_run_with_what_does_the_last_one_again(tmp_path: Path) -> None:
