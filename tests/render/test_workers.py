@@ -108,7 +108,7 @@ def test_work_of_a_killed_process_is_done_again(two, here, gate, caplog) -> None
     assert len(processes()) == 2
 
 
-def test_work_of_a_stopped_process_is_done_again(two, here, gate, caplog, monkeypatch) -> None:
+def test_work_of_a_stopped_process_is_done_again(two, here, caplog, monkeypatch) -> None:
     assert_same(render(two, states(8)), render(here, states(8)))  # there has been a reply
     monkeypatch.setattr(watchdog, "SHORTEST_SECONDS", 2)
     monkeypatch.setattr(watchdog, "TIMES_THE_SLOWEST", 0)
