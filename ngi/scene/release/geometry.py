@@ -137,7 +137,7 @@ def _file(source: Source, shape: Element) -> Path:
     name = shape.find("string[@name='filename']")
     if name is None:
         raise source.error(shape, "names no file; give <string name='filename' value='...'/>")
-    return source.document.path.parent / source.document.value(name)
+    return source.document.path.parent / name.get("value", "")
 
 
 def _child(source: Source, shape: Element, name: str, z: float) -> Vector:
