@@ -8,6 +8,9 @@ from xml.etree import ElementTree
 from ngi.backend import mi
 from ngi.scene.scene_files import SceneFile, file_references
 
+FROM_FILES = ("bitmap", "envmap", "gridvolume", "obj", "ply", "serialized")
+"""Plugins that are nothing without a file; Mitsuba 3.9 crashes on a bitmap without."""
+
 
 def load(document: SceneFile) -> mi.Scene:
     """The scene of a stock Mitsuba 3 document, whose files are named from its folder.
@@ -19,6 +22,12 @@ def load(document: SceneFile) -> mi.Scene:
     for _, element, attribute in file_references(absolute):
         element.set(attribute, str(folder / element.get(attribute, "")))
     # Optimising would merge meshes that share a BSDF, and their ids would be lost.
+    for element in absolute.iter():
+        if element.get("type") in FROM_FILES and element.find("string[@name='filename']") is None:
+            place = f"<{element.tag} type='{element.get('type')}'>"
+            raise ValueError(
+                f"{document.path}: {place} names no file; give it <string name='filename' …/>"
+            )
     text = ElementTree.tostring(absolute, encoding="unicode")
     try:
         return mi.load_string(text, optimize=False)

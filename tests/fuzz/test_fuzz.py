@@ -7,7 +7,9 @@ import logging
 import pytest
 
 from ngi.scene import read_scene
+from ngi.scene.loading import load
 from ngi.scene.release import read_release
+from ngi.scene.scene_files import read_scene_file
 from ngi.scene.variable_scene import VariableScene
 from tests.fuzz.fuzzer import fuzz, read_one
 from tests.fuzz.seeds import RELEASES, SCENES, XML, write_seed
@@ -67,6 +69,14 @@ def test_what_the_fuzzer_found(tmp_path, kind, text) -> None:
     assert text not in (*SCENES, *RELEASES, XML.encode())
     write_seed(tmp_path)
     assert read_one(tmp_path, kind, text) is None
+
+
+def test_a_bitmap_without_a_file_does_not_crash_mitsuba(tmp_path) -> None:
+    write_seed(tmp_path)
+    named = '<string name="filename" value="a.png"/>'
+    (tmp_path / "scene.xml").write_text(XML.replace(named, "").replace(f"\n  {named}", ""))
+    with pytest.raises(ValueError, match=r"scene\.xml: <texture type='bitmap'> names no file"):
+        load(read_scene_file(tmp_path / "scene.xml"))
 
 
 PLY = "ply\nformat {} 1.0\nelement vertex {}\n{}end_header\n{}"

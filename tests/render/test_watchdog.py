@@ -98,6 +98,7 @@ def test_a_limit_scales_with_the_slowest_reply(monkeypatch) -> None:
         assert dog.limit(8, lost=0) == expected
     assert dog.limit(8, lost=2) == 4 * 1200
     assert dog.limit(0, lost=0) == STARTING_SECONDS
+    assert dog.limit(0, lost=1) == 2 * STARTING_SECONDS
 
 
 def test_a_program_that_was_stopped_itself_has_not_been_waiting(monkeypatch) -> None:
