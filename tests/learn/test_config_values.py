@@ -5,6 +5,7 @@ Either all parts of a run can be built with it, or a message that `ngi.train` sh
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -131,6 +132,29 @@ def problem(variant: int, changes: dict[str, Any], folder: Path) -> str | None:
     except Exception as error:
         return f"{changes}: {type(error).__name__}: {error}"
     return None
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("loss.l1_weight", float("nan"), "nan is not a finite number that can be used here"),
+        ("run.checkpoint_seconds", float("inf"), "inf is not a finite number"),
+        ("run.checkpoint_steps", 1e5, "100000.0 is not an integer or null"),
+        ("sampler.chains", True, "True is not an integer"),
+        ("sampler.chains", 2**31, "2147483648 is not an integer"),
+        ("model.position_preconditioning", 1, "1 is not true or false"),
+        ("reuse.when_late", 3, None),
+    ],
+)
+def test_a_value_of_the_wrong_kind_is_named(key, value, said) -> None:
+    config = base(0).copy()
+    check_values(config)
+    OmegaConf.update(config, key, value)
+    if said is None:  # no argument of a class: what takes it checks it
+        check_values(config)
+        return
+    with pytest.raises(ValueError, match=f"^{re.escape(f'{key}: {said}')}"):
+        check_values(config)
 
 
 @pytest.mark.parametrize(("variant", "key"), KEYS)
