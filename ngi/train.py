@@ -17,6 +17,7 @@ from omegaconf import DictConfig, OmegaConf
 
 import ngi
 from ngi.build import build_module, build_stream, plain, run_costs
+from ngi.config_values import check_values
 from ngi.energy import EnergyMeter, energy_counters
 from ngi.memory import keep_freed_memory
 from ngi.precision import fast_precision
@@ -44,6 +45,10 @@ NOT_IDENTITY = (
 """Parts of the configuration that do not decide what a run computes: names, places, helpers."""
 
 
+MESSAGES = (ValueError, OSError, RuntimeError, FloatingPointError, TypeError)
+"""Exceptions whose text says to users what is wrong; all others are bugs."""
+
+
 def train(config: DictConfig) -> dict[str, Any]:
     """Runs, or resumes, the run that `config` describes and returns its result.
 
@@ -53,6 +58,7 @@ def train(config: DictConfig) -> dict[str, Any]:
     from ngi import learn  # PyTorch and Lightning take seconds that --help need not wait for
 
     keep_freed_memory()
+    check_values(config)
     budget = instantiate(config.budget)
     renderer = instantiate(config.renderer)
     costs = run_costs(config, budget=budget, renderer=renderer)
@@ -172,7 +178,7 @@ def register() -> None:
 def _main(config: DictConfig) -> None:
     try:
         result = train(config)
-    except (ValueError, OSError, RuntimeError, FloatingPointError, TypeError) as error:
+    except MESSAGES as error:
         # Hydra reports only the first failed job of a sweep: each says for itself what was wrong,
         # in its own log too; the traceback is for those who ask for it.
         log.error("%s", error)

@@ -58,6 +58,7 @@ def test_no_constructor_takes_a_configuration() -> None:
     assert users == {
         "ngi/train.py",
         "ngi/build.py",
+        "ngi/config_values.py",
         "ngi/costs.py",
         "ngi/exploration_map/training.py",
         "ngi/stability/training_run.py",

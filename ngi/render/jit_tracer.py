@@ -18,6 +18,7 @@ from torch import Tensor
 
 from ngi.backend import dr, mi
 from ngi.render.first_hit import FirstHit
+from ngi.render.fitting import does_not_fit
 from ngi.render.tracing import Pending, Window, subpixel_points
 
 Trace = Callable[..., "list[mi.Float]"]
@@ -118,11 +119,19 @@ def _replayed(function: Trace) -> Trace:
             try:
                 return list(recorded(*arguments))
             except RuntimeError as error:
+                if does_not_fit(error):
+                    raise
                 works = False
                 _logger.warning("patches of this scene take longer: %s", error)
         return function(*arguments)
 
     return trace
+
+
+def free_memory() -> None:
+    """Gives back what Dr.Jit keeps for later launches, once those under way have ended."""
+    dr.sync_thread()
+    dr.flush_malloc_cache()
 
 
 @dataclass(frozen=True)

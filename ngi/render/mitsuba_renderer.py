@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import logging
+
 import numpy as np
 import torch
 from torch import Tensor
 
 from ngi.backend import activate, describe, mi
 from ngi.render.first_hit import first_hit_of
-from ngi.render.jit_tracer import JitTracer
+from ngi.render.fitting import FittingTracer
+from ngi.render.jit_tracer import JitTracer, free_memory
 from ngi.render.launches import SAMPLES_PER_PASS, bands, passes
 from ngi.render.needs import buffers_are_static
 from ngi.render.protocol import Deferred, RenderedPatches
@@ -18,6 +21,8 @@ from ngi.render.tracing import Pending, Tracer, derive_seed
 from ngi.scene import SceneDescription
 from ngi.scene.kinds import most_materials
 from ngi.scene.variable_scene import VariableScene
+
+_logger = logging.getLogger(__name__)
 
 BUFFER_SAMPLES = {"cuda_ad_rgb": 16, "llvm_ad_rgb": 16, "scalar_rgb": 2}
 """Samples per pixel of the buffers by default; a Python loop takes them in the scalar variant."""
@@ -78,8 +83,14 @@ class MitsubaRenderer:
             )
         else:
             self._patch_tracer, self._image_tracer = (
-                JitTracer(
-                    scene=loaded, first_hit=first_hit, buffer_samples=buffer_samples, frozen=frozen
+                FittingTracer(
+                    JitTracer(
+                        scene=loaded,
+                        first_hit=first_hit,
+                        buffer_samples=buffer_samples,
+                        frozen=frozen,
+                    ),
+                    free=free_memory,
                 )
                 for frozen in (True, False)
             )
@@ -174,7 +185,11 @@ class MitsubaRenderer:
         return torch.tensor(self._scene.description.hard_frames, dtype=torch.float32)
 
     def close(self) -> None:
-        """See `ngi.render.Renderer.close`."""
+        """See `ngi.render.Renderer.close`; says how many launches did not fit into memory."""
+        tracers = (self._patch_tracer, self._image_tracer)
+        split = sum(tracer.split for tracer in tracers if isinstance(tracer, FittingTracer))
+        if split:
+            _logger.warning("%d launches did not fit into memory and were traced in parts", split)
 
     def _launch_patch(
         self, state: Tensor, resolution: int, seed: int, *, sizes: list[int], attempt: int = 0

@@ -1,4 +1,4 @@
-"""Shares requests for patches out among renderers elsewhere, and replaces those that die."""
+"""Shares requests for patches out among renderers elsewhere, and replaces those that are lost."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ngi.render.protocol import RenderedPatches
-from ngi.render.worker_protocol import Request, Worker, WorkerDiedError
+from ngi.render.watchdog import Watchdog
+from ngi.render.worker_protocol import Reply, Request, Worker, WorkerDiedError
 
 _logger = logging.getLogger(__name__)
 
@@ -25,7 +26,8 @@ class _Task:
 class WorkerPool:
     """A number of workers, started when they are first needed.
 
-    start: starts worker number 0, 1, ...; called again for a number whose worker has died.
+    start: starts worker number 0, 1, ...; called again for a number whose worker has died, or has
+        not answered for so long that the watchdog ended it.
     workers: how many.
 
     One thread per worker sleeps until there is something to send or to receive, so that workers go
@@ -45,6 +47,10 @@ class WorkerPool:
             threading.Thread(target=self._serve, args=(i,), name=f"renderer-{i}", daemon=True)
             for i in range(workers)
         ]
+        self._watchdog = Watchdog()
+        self._threads.append(
+            threading.Thread(target=self._watchdog.run, name="renderer-watchdog", daemon=True)
+        )
 
     def submit(self, requests: Iterable[Request]) -> list[Future[RenderedPatches]]:
         """The patches of every request, when they are there; begun in this order."""
@@ -87,6 +93,7 @@ class WorkerPool:
                 future.set_exception(self._end)
             for worker in self._alive.values():
                 worker.kill()
+            self._watchdog.end()
             self._changed.notify_all()
 
     def _serve(self, number: int) -> None:
@@ -120,7 +127,7 @@ class WorkerPool:
 
     def _converse(self, number: int, worker: Worker, sent: deque[_Task]) -> None:
         """Requests and replies, until nothing is wanted any more; `sent` awaits its replies."""
-        reply = worker.receive()
+        reply = self._receive(worker, patches=0)
         if isinstance(reply, Exception):
             raise reply
         with self._changed:
@@ -132,7 +139,7 @@ class WorkerPool:
                 worker.send(task.request)
             if not sent:
                 return
-            reply = worker.receive()
+            reply = self._receive(worker, patches=len(sent[0].request.states))
             with self._changed:
                 self._deaths = 0
             patches = sent.popleft().patches
@@ -141,6 +148,12 @@ class WorkerPool:
             else:
                 assert reply is not None
                 patches.set_result(reply)
+
+    def _receive(self, worker: Worker, *, patches: int) -> Reply:
+        with self._changed:
+            lost = self._deaths
+        with self._watchdog.waiting(worker, patches=patches, lost=lost):
+            return worker.receive()
 
     def _next(self, *, wait: bool) -> _Task | None:
         """wait: for as long as it takes; otherwise only what no idle worker could begin now."""
@@ -159,11 +172,11 @@ class WorkerPool:
             if self._end is not None:
                 return
             self._deaths += 1
-        if self._deaths > len(self._threads) + 1:
+        if self._deaths > len(self._ready) + 1:
             raise RuntimeError(
-                f"renderer.workers: {self._deaths} workers died one after the other and rendered "
-                f"nothing (the last one: {death}); look for 'Out of memory' in `dmesg` and lower "
-                "renderer.workers, or see the error with renderer.workers=0"
+                f"renderer.workers: {self._deaths} workers were lost one after the other and "
+                f"rendered nothing (the last one: {death}); look for 'Out of memory' in "
+                "`dmesg` and lower renderer.workers, or see the error with renderer.workers=0"
             )
         _logger.warning(
             "%s died (%s); it is replaced, and %d patches are rendered again",

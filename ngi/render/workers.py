@@ -45,7 +45,9 @@ class WorkerRenderer:
 
     make: makes the renderer, here and in every worker; can be pickled, and not of `__main__`.
     workers: how many, at least 1. A worker that dies is replaced, with a warning in the log, and
-        what it had not rendered is rendered again.
+        what it had not rendered is rendered again. So is one that has not answered for far longer
+        than its requests take, see `ngi.render.watchdog`; images, which are rendered in this
+        process, cannot be interrupted, nor can patches without workers.
     cluster: None for processes of this machine, otherwise the address of a Ray cluster, 'auto' for
         the one that this machine belongs to.
 

@@ -65,7 +65,7 @@ def arranged(
             root.remove(shape)
             group.append(shape)
         _add_instance(root, STATIC, of=group)
-    return SceneFile(document.path, root, document.defaults)
+    return SceneFile(document.path, root)
 
 
 def moving(variables: Sequence[Variable]) -> set[str]:
@@ -82,7 +82,7 @@ def moving(variables: Sequence[Variable]) -> set[str]:
 def _mesh_size(document: SceneFile, shape: ElementTree.Element) -> int:
     """Bytes of the shape's file, 0 where it has none."""
     name = shape.find("string[@name='filename']")
-    path = document.path.parent / (document.value(name) if name is not None else "")
+    path = document.path.parent / (name.get("value", "") if name is not None else "")
     return path.stat().st_size if path.is_file() else 0
 
 

@@ -86,7 +86,7 @@ def load_vertices(document: SceneFile, object_id: str, path: Path) -> tuple[Valu
     name = authored.find("string[@name='filename']")
     if name is None:
         raise ValueError(f"{document.path}: '{object_id}' is not a mesh that comes from a file")
-    name.set("value", str(document.path.parent.resolve() / document.value(name)))
+    name.set("value", str(document.path.parent.resolve() / name.get("value", "")))
     present = mi.traverse(_loaded(document, authored))
     name.set("value", str(path))
     other = mi.traverse(_loaded(document, authored))
@@ -114,9 +114,6 @@ def _shape(document: SceneFile, object_id: str) -> ElementTree.Element:
 
 def _loaded(document: SceneFile, element: ElementTree.Element) -> mi.Object:
     alone = copy.deepcopy(element)
-    for part in alone.iter():
-        for attribute in part.attrib:
-            part.set(attribute, document.value(part, attribute))
     alone.set("version", document.root.get("version", "3.0.0"))
     return mi.load_string(ElementTree.tostring(alone, encoding="unicode"), optimize=False)
 

@@ -14,6 +14,7 @@ from ngi.resources import scene_folders
 from ngi.scene.description import SceneDescription, component_names
 from ngi.scene.frames import HARD_FRAMES, PATH_FRAMES, spread_frames
 from ngi.scene.kinds import KINDS
+from ngi.scene.permission import allowed_file
 from ngi.scene.scene_files import (
     content_hash,
     integrator_max_depth,
@@ -21,7 +22,8 @@ from ngi.scene.scene_files import (
     read_scene_file,
 )
 from ngi.scene.variable import Variable
-from ngi.scene.yaml_keys import Vector, YamlKeys, load_yaml
+from ngi.scene.yaml_keys import Vector, YamlKeys
+from ngi.scene.yaml_loader import load_yaml
 
 _SAME_THING = {"camera_path": "look_at", "texels": "texture"}
 """Kinds that set what another kind sets."""
@@ -42,9 +44,10 @@ def read_scene(folder: Path | str, *, dimensions: int | None = None) -> SceneDes
     path = folder / "scene.yaml"
     if not path.is_file():
         raise FileNotFoundError(f"{path}: no such file; a scene is a folder with a scene.yaml")
+    allowed_file(folder, path.name, within=folder, where=str(folder))
     top = YamlKeys(path, "", load_yaml(path))
-    scene_file = folder / top.take("scene", str)
-    xml = read_scene_file(scene_file)
+    scene_file = _file(top, "scene", top.take("scene", str))
+    xml = read_scene_file(scene_file, within=folder)
     variables = _variables(top)
     complete = len(component_names(variables))
     variants = top.integers("variants") if "variants" in top else []
@@ -52,10 +55,7 @@ def read_scene(folder: Path | str, *, dimensions: int | None = None) -> SceneDes
     low, high = (bounds.numbers(key, length=3) for key in ("minimum", "maximum"))
     bounds.check_range(low, high, strict=True)
     bounds.finish()
-    beside = [(name, folder / name) for variable in variables for name in variable.files]
-    for name, file in beside:
-        if not file.is_file():
-            raise FileNotFoundError(f"{path}: names '{name}', but there is no {file}; bring it")
+    beside = [(name, _file(top, "variables", name)) for v in variables for name in v.files]
     contents = [("scene.yaml", path), (scene_file.name, scene_file), *named_files(xml), *beside]
     description = SceneDescription(
         name=top.take("name", str),
@@ -120,6 +120,11 @@ def _max_depth(top: YamlKeys) -> int:
     if depth < 1 and depth != -1:
         raise top.error("max_depth", depth, "expected a positive integer, or -1 for no limit")
     return depth
+
+
+def _file(top: YamlKeys, key: str, name: str) -> Path:
+    folder = top.path.parent
+    return allowed_file(folder, name, within=folder, where=f"{top.path}: {key}")
 
 
 def _frames(top: YamlKeys, key: str, count: int, dimensions: int) -> tuple[Vector, ...]:

@@ -3,67 +3,114 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
 
+from ngi.scene.permission import allowed_file
+from ngi.scene.xml_file import Lines, read_xml
+
+NamedFile = tuple[str, Path]
+
+
+MOST_INCLUDES = 100
+
 
 @dataclass(frozen=True)
 class SceneFile:
-    """A Mitsuba XML file: the root element and the values of its <default>s."""
+    """A Mitsuba XML file, with its <default>s and <include>s replaced by what they stand for.
+
+    root: every file in it is named from the folder of `path`.
+    included: names and paths of the XML files that it includes.
+    """
 
     path: Path
     root: ElementTree.Element
-    defaults: dict[str, str]
-
-    def value(self, element: ElementTree.Element, attribute: str = "value") -> str:
-        """An attribute with every $name replaced by its default."""
-        text = element.get(attribute, "")
-        for name in sorted(self.defaults, key=len, reverse=True):
-            text = text.replace(f"${name}", self.defaults[name])
-        return text
+    included: tuple[NamedFile, ...] = ()
 
 
-def read_scene_file(path: Path) -> SceneFile:
-    """Raises ValueError, naming the line, for broken XML and FileNotFoundError for no file."""
+def read_scene_file(path: Path, *, within: Path | None = None) -> SceneFile:
+    """A Mitsuba XML file and those that it includes.
+
+    within: the folder whose files it may name, see `ngi.scene.permission`; its own where None.
+
+    Raises FileNotFoundError for a file that is not there, and ValueError for broken XML and for
+    files that it must not read, both with what to do.
+    """
     if not path.is_file():
         raise FileNotFoundError(f"{path}: no such scene file; check the key 'scene' in scene.yaml")
-    try:
-        root = ElementTree.parse(path).getroot()
-    except ElementTree.ParseError as error:
-        raise ValueError(f"{path}: not well-formed XML: {error}; correct the file there") from None
-    defaults = {e.get("name", ""): e.get("value", "") for e in root.iter("default")}
-    return SceneFile(path, root, defaults)
+    within = within or path.parent
+    defaults: dict[str, str] = {}
+    included: list[NamedFile] = []
+    root, lines = read_xml(path, defaults)
+    check_files(SceneFile(path, root), lines, within=within)
+    while (place := _first_include(root)) is not None:
+        parent, index = place
+        name = parent[index].get("filename", "")
+        if len(included) >= MOST_INCLUDES:
+            raise ValueError(f"{path}: <include> of '{name}': more than {MOST_INCLUDES}, or a loop")
+        file = path.parent / name
+        content, lines = read_xml(file, defaults)
+        for _, element, attribute in file_references(content):
+            below = os.path.relpath(file.parent / element.get(attribute, ""), path.parent)
+            element.set(attribute, below)
+        check_files(SceneFile(file, content), lines, within=within, folder=path.parent)
+        included.append((name, file))
+        parent[index : index + 1] = list(content)
+    return SceneFile(path, root, tuple(included))
 
 
-def named_files(scene: SceneFile) -> list[tuple[str, Path]]:
-    """Every file the scene names, as (name in the XML, path), files of included XML too.
+def _first_include(root: ElementTree.Element) -> tuple[ElementTree.Element, int] | None:
+    for parent in root.iter():
+        for index, child in enumerate(parent):
+            if child.tag == "include":
+                return parent, index
+    return None
 
-    Raises FileNotFoundError, with the name in the XML, for the first one that is missing.
+
+def check_files(
+    scene: SceneFile, lines: Lines, *, within: Path, folder: Path | None = None
+) -> None:
+    """Finds files that are not there, all of them, or must not be read.
+
+    folder: that they are named from, where it is not the file's own.
     """
-    files: list[tuple[str, Path]] = []
-    for tag, element, attribute in file_references(scene):
-        name = scene.value(element, attribute)
-        path = scene.path.parent / name
-        if not path.is_file():
-            raise FileNotFoundError(
-                f"{scene.path}: <{tag}> names '{name}', which is not there; "
-                f"bring the file to {path} or correct the name"
-            )
-        files.append((name, path))
-        if tag == "include":
-            files += named_files(read_scene_file(path))
-    return files
+    missing = []
+    for tag, element, attribute in file_references(scene.root):
+        where = f"{scene.path}, line {lines[element]}: <{tag}>"
+        name = element.get(attribute, "")
+        try:
+            allowed_file(folder or scene.path.parent, name, within=within, where=where)
+        except FileNotFoundError as error:
+            missing.append(str(error))
+    if missing:
+        raise FileNotFoundError("; ".join(missing))
+    for element, line in lines.items():
+        value, name = element.get("value", ""), element.get("name", "")
+        if element.tag == "path":
+            problem = "<path>: take it out; files are named from the folder of this one"
+        elif element.tag == "string" and name != "filename" and {"/", "\\"} & set(value):
+            problem = f"<string name='{name}'> is '{value}'; only 'filename' names a file"
+        else:
+            continue
+        raise ValueError(f"{scene.path}, line {line}: {problem}")
+
+
+def named_files(scene: SceneFile) -> list[NamedFile]:
+    """Every file the scene names, as (name in the XML, path), files of included XML too."""
+    names = [element.get(attribute, "") for _, element, attribute in file_references(scene.root)]
+    return [*scene.included, *((name, scene.path.parent / name) for name in names)]
 
 
 def file_references(
-    scene: SceneFile,
+    root: ElementTree.Element,
 ) -> Iterator[tuple[str, ElementTree.Element, str]]:
     """Where files are named: the tag of what needs the file, and the element and attribute."""
-    for element in scene.root.iter():
-        if element.tag == "include":
-            yield "include", element, "filename"
+    for element in root.iter():
+        if "filename" in element.attrib or element.tag == "include":
+            yield element.tag, element, "filename"
         for child in element:
             if child.tag == "string" and child.get("name") == "filename":
                 yield element.tag, child, "value"
@@ -79,12 +126,12 @@ def integrator_max_depth(scene: SceneFile) -> int:
     if integrator is None:
         raise ValueError(f"{scene.path}: no <integrator>; add one, <integrator type='path'>")
     hidden = integrator.find("boolean[@name='hide_emitters']")
-    if hidden is not None and scene.value(hidden) == "true":
+    if hidden is not None and hidden.get("value") == "true":
         raise ValueError(f"{scene.path}: hide_emitters is true, set it to false: emitters show")
     depth = integrator.find("integer[@name='max_depth']")
     if depth is None:
         return -1
-    value = scene.value(depth)
+    value = depth.get("value", "")
     try:
         return int(value)
     except ValueError:

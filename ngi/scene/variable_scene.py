@@ -13,6 +13,7 @@ from ngi.scene.description import SceneDescription
 from ngi.scene.kinds import Material
 from ngi.scene.loading import load
 from ngi.scene.scene_parameters import SceneParameters, has_surface
+from ngi.scene.variable import Variable, Write
 
 
 class VariableScene:
@@ -36,9 +37,19 @@ class VariableScene:
             size=float(np.linalg.norm(np.subtract(*description.bounds))),
         )
         self.shapes: list[mi.Shape] = self._parameters.objects(mi.Shape)
-        self._writes = [variable.bind(self._parameters) for variable in description.variables]
+        self._writes = [self._bind(variable) for variable in description.variables]
         self._parameters.forget_the_rest()
         self._values: list[NDArray[np.float64] | None] = [None] * len(self._writes)
+
+    def _bind(self, variable: Variable) -> Write:
+        """ValueError, naming the file and the variable, also for what Mitsuba does not take."""
+        try:
+            return variable.bind(self._parameters)
+        except (ValueError, RuntimeError) as error:
+            path = str(self.description.document.path)
+            place = f"{'+'.join(variable.objects)}.{variable.kind}"
+            prefix = "" if path in str(error) else f"{path}: {place}: "
+            raise ValueError(f"{prefix}{error}") from error
 
     @cached_property
     def moving(self) -> frozenset[str]:

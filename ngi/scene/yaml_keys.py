@@ -2,50 +2,22 @@
 
 from __future__ import annotations
 
+import reprlib
 import sys
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-import yaml
-from yaml.composer import ComposerError
-
 Vector = tuple[float, ...]
 
 
-class _UniqueKeyLoader(yaml.SafeLoader):
-    """YAML's safe loader; of a key that is there twice, that one would silently take the last."""
+LARGEST_INTEGER = 2**31 - 1
+"""What Mitsuba takes."""
 
-    def compose_mapping_node(self, anchor: Any) -> yaml.MappingNode:
-        node: yaml.MappingNode = super().compose_mapping_node(anchor)
-        seen: set[str] = set()
-        for key in (key for key, _ in node.value if isinstance(key, yaml.ScalarNode)):
-            if key.value in seen:
-                problem = f"the key '{key.value}' is there twice; keep one of them"
-                raise ComposerError(problem=problem, problem_mark=key.start_mark)
-            seen.add(key.value)
-        return node
-
-
-def load_yaml(path: Path) -> dict[str, Any]:
-    """The file's mapping.
-
-    Raises ValueError, naming the file and where possible the line, for broken YAML, a key that is
-    there twice and text that is not UTF-8.
-    """
-    try:
-        content = yaml.load(path.read_text(encoding="utf-8"), Loader=_UniqueKeyLoader)
-    except yaml.MarkedYAMLError as error:
-        line = error.problem_mark.line + 1 if error.problem_mark else "?"
-        raise ValueError(f"{path}, line {line}: broken YAML: {error.problem}") from None
-    except yaml.YAMLError as error:
-        raise ValueError(f"{path}: broken YAML: {' '.join(str(error).split())}") from None
-    except UnicodeDecodeError as error:
-        raise ValueError(f"{path}: not UTF-8 ({error}); save it in that encoding") from None
-    if not isinstance(content, dict):
-        raise ValueError(f"{path}: expected keys and values, got {type(content).__name__}")
-    return content
+_SHORT = reprlib.Repr()
+_SHORT.maxlevel, _SHORT.maxlist, _SHORT.maxtuple, _SHORT.maxdict = 3, 30, 30, 10
+_SHORT.maxstring = _SHORT.maxother = 200
 
 
 @dataclass
@@ -60,13 +32,15 @@ class YamlKeys:
     def __post_init__(self) -> None:
         if not isinstance(self.values, dict):
             place = self.prefix.rstrip(".")
-            raise ValueError(f"{self.path}: {place} is {self.values!r}; expected keys and values")
+            raise ValueError(
+                f"{self.path}: {place} is {_SHORT.repr(self.values)}; expected keys and values"
+            )
 
     def __contains__(self, key: str) -> bool:
         return key in self.values
 
     def error(self, key: str, value: object, advice: str) -> ValueError:
-        return ValueError(f"{self.path}: {self.prefix}{key} is {value!r}; {advice}")
+        return ValueError(f"{self.path}: {self.prefix}{key} is {_SHORT.repr(value)}; {advice}")
 
     def take(self, key: str, kind: type) -> Any:
         if key not in self.values:
@@ -79,8 +53,8 @@ class YamlKeys:
 
     def positive_integer(self, key: str) -> int:
         value: int = self.take(key, int)
-        if value < 1:
-            raise self.error(key, value, "expected a positive integer")
+        if not 1 <= value <= LARGEST_INTEGER:
+            raise self.error(key, value, f"expected a positive integer up to {LARGEST_INTEGER}")
         return value
 
     def numbers(self, key: str, *, length: int) -> Vector:

@@ -212,6 +212,43 @@ def test_what_it_shows_is_escaped(make_run, tmp_path) -> None:
     assert any(name in image["alt"] for image in page.all("img"))
 
 
+HOSTILE = "<script>alert(1)<!--\"><img src=x onerror=alert(2)>'&amp;{{ 7 * 7 }}$\\frac{"
+"""Could be the name of a folder too; the dollar begins a formula for matplotlib."""
+
+
+def test_hostile_names_are_shown_as_they_are_everywhere(make_run, make_method, tmp_path) -> None:
+    def spoil(result: dict) -> None:
+        for key in ("commit", "lpips_note", "scene_hash", "reference_hash", "identity"):
+            result[key] = HOSTILE
+        result["protocol"]["name"] = result["protocol"]["identity"] = HOSTILE
+        result["machine"] = {"cpu": HOSTILE, "gpu": HOSTILE, HOSTILE: HOSTILE}
+        result["versions"] = {"torch": HOSTILE, HOSTILE: HOSTILE}
+        result["backend"] = HOSTILE
+        result["config"] = {HOSTILE: HOSTILE}
+        for key in ("experiment", "budget", "model", "loss", "resolution"):
+            result["label"][key] = HOSTILE
+
+    make_run(seed=3, scene=HOSTILE, sampler=HOSTILE, lpips=False, change=spoil)
+    make_method(HOSTILE, scene=HOSTILE, lpips=False, change=spoil)
+    make_method("uniform", seed=1, scene=HOSTILE, change=spoil)
+    folder = make_run(seed=2, scene=f"damaged {HOSTILE}")
+    (folder / "result.json").write_text(f'{{"{HOSTILE}"')
+    root = (tmp_path / "runs").rename(tmp_path / HOSTILE)
+    page = page_of(root, tmp_path / "report")
+    for tag, attributes in page.elements:
+        assert tag not in ("script", "iframe", "object", "form")
+        assert not [name for name in attributes if name.startswith("on")]
+        assert (attributes.get("src") or "data:").startswith("data:")
+    assert "{{ 7 * 7 }}" in page.text
+    assert page.text.count(HOSTILE) > 5
+    for image in page.all("img"):
+        assert image["alt"]
+        if image["src"].startswith("data:image/svg"):
+            svg = base64.b64decode(image["src"].partition(",")[2])
+            assert b"<script" not in svg
+            assert b"onerror=" not in re.sub(rb">[^<]*<", b"><", svg)
+
+
 def test_runs_that_test_no_claim_make_a_page_too(plain) -> None:
     page = plain.page
     assert "They test none of the paper's claims" in page.text

@@ -15,6 +15,7 @@ import torch
 from omegaconf import open_dict
 
 from ngi.backend import llvm_problem
+from ngi.render import watchdog
 from ngi.render.mitsuba_renderer import MitsubaRenderer
 from ngi.render.worker_process import WorkerProcess, visible_gpus
 from ngi.render.worker_protocol import Request
@@ -104,6 +105,25 @@ def test_work_of_a_killed_process_is_done_again(two, here, gate, caplog) -> None
         r"[1-9] patches are rendered again",
         record.message,
     )
+    assert len(processes()) == 2
+
+
+def test_work_of_a_stopped_process_is_done_again(two, here, caplog, monkeypatch) -> None:
+    assert_same(render(two, states(8)), render(here, states(8)))  # there has been a reply
+    monkeypatch.setattr(watchdog, "SHORTEST_SECONDS", 2)
+    monkeypatch.setattr(watchdog, "TIMES_THE_SLOWEST", 0)
+    before = processes()
+    victim = min(before)
+    os.kill(victim, signal.SIGSTOP)
+    given = states(16, 4)
+    assert_same(render(two, given), render(here, given))
+    (record,) = caplog.records
+    assert re.fullmatch(
+        rf"renderer process [01] \(pid {victim}\) died \(killed: no answer within 2 s\); it is "
+        r"replaced, and [1-9] patches are rendered again",
+        record.message,
+    )
+    assert victim not in processes()
     assert len(processes()) == 2
 
 

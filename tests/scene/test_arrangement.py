@@ -29,7 +29,7 @@ XML = """<scene version="3.0.0">
 
 
 def document(xml=XML):
-    return SceneFile(Path("scene.xml"), ElementTree.fromstring(xml), {})
+    return SceneFile(Path("scene.xml"), ElementTree.fromstring(xml))
 
 
 def top_level(scene):
@@ -126,7 +126,7 @@ def test_small_scenes_keep_their_shapes_and_large_ones_do_not(tmp_path) -> None:
     )
     assert named != XML
     (tmp_path / "curtain.ply").write_bytes(bytes(1000))
-    scene = SceneFile(tmp_path / "scene.xml", ElementTree.fromstring(named), {})
+    scene = SceneFile(tmp_path / "scene.xml", ElementTree.fromstring(named))
     small = arranged(scene, [move("chair")], worthwhile=1001)
     assert top_level(small) == top_level(scene)
     large = arranged(scene, [move("chair")], worthwhile=1000)

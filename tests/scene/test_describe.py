@@ -135,7 +135,7 @@ def test_a_plain_file_becomes_a_variable_scene(room, capsys) -> None:
     ("edit", "message"),
     [
         (lambda folder: (folder / "scene.yaml").write_text("name: ["), "broken YAML"),
-        (lambda folder: (folder / "scene.xml").unlink(), "no such scene file"),
+        (lambda folder: (folder / "scene.xml").unlink(), "names 'scene.xml', which is not there"),
         (lambda folder: shutil.rmtree(folder), "no scene of this name"),
     ],
 )

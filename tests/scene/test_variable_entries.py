@@ -126,7 +126,11 @@ WRONG = [
     ("roughness", "minimum: 0.1, maximum: 1e-1", "maximum is '1e-1'; expected 1 finite"),
     ("roughness", "minimum: 0.1, maximum: 0.5, linked: true", "unknown key .*linked"),
     ("intensity", "minimum: -1, maximum: 2", r"minimum is \[-1.0\]; intensity"),
-    ("intensity", f"minimum: 0, maximum: 1{'0' * 400}", "maximum is 10*; expected 1 finite"),
+    (
+        "intensity",
+        f"minimum: 0, maximum: 1{'0' * 400}",
+        "maximum is 10*[.]{3}0*; expected 1 finite",
+    ),
     ("radiance", "minimum: [0, 0, -2], maximum: [9, 9, 9]", "minimum is .*radiance lies between"),
     ("texture", "choices: [scene.xml]", r"choices is \['scene.xml'\]; expected at least 2"),
     ("texture", "choices: scene.xml", "choices is 'scene.xml'; expected at least 2"),
@@ -208,7 +212,7 @@ def test_no_variables(tmp_path) -> None:
 @pytest.mark.parametrize("kind", ["texture", "key_frames"])
 def test_files_that_are_not_there(tmp_path, kind) -> None:
     keys = RIGHT[kind].replace("scene.yaml", "b.png")
-    with pytest.raises(FileNotFoundError, match=r"scene.yaml: names 'b.png', but there is no .*b"):
+    with pytest.raises(FileNotFoundError, match=r"scene.yaml: variables names 'b.png', which"):
         read_scene(folder_with(tmp_path, entry(kind, keys)))
 
 

@@ -30,6 +30,10 @@ _REFLECTANCES = (
 )
 
 
+MOST_TEXELS = 2**16
+"""Every one is a component of v, which is stored with every patch."""
+
+
 @dataclass(frozen=True)
 class Albedo(RangedVariable):
     """Reflectance of a BSDF, linear RGB; it replaces the authored one, of whichever kind it is."""
@@ -171,6 +175,8 @@ class Texels(Variable):
         rows, columns = keys.numbers("size", length=2)
         if min(rows, columns) < 1 or rows % 1 or columns % 1:
             raise keys.error("size", [rows, columns], "expected two positive integers")
+        if rows * columns > MOST_TEXELS:
+            raise keys.error("size", [rows, columns], f"at most {MOST_TEXELS} texels can vary")
         (low,), (high,) = (keys.numbers(key, length=1) for key in ("minimum", "maximum"))
         for key, value in (("minimum", low), ("maximum", high)):
             if not 0 <= value <= 1:

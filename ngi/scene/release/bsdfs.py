@@ -117,7 +117,8 @@ def _choice(objects: Objects, bsdf: Element) -> Material:
         )
     copies = [objects.copy(outer) for _ in textures[1:]]
     for index, one in enumerate([outer, *copies]):
-        inner = _inner(next(e for e in one.iter("bsdf") if len(_reflectances(_inner(e)))))
+        inners = (_inner(element) for element in one.iter("bsdf"))
+        inner = next((i for i in inners if _reflectances(i)), one)
         for other, texture in enumerate(_reflectances(inner)):
             if other != index:
                 inner.remove(texture)
@@ -145,5 +146,5 @@ def _reflectances(bsdf: Element) -> list[Element]:
 
 def _texture(objects: Objects, element: Element) -> Element | None:
     if element.tag == "ref":
-        return objects.by_id(element.attrib["id"])
+        return objects.by_id(element.get("id", ""))
     return element if element.tag == "texture" else None

@@ -17,6 +17,9 @@ from ngi.scene.yaml_keys import Vector
 
 Box = tuple[Values, Values]
 
+FARTHEST = 1e15
+"""Squares of more do not fit into single precision together."""
+
 _CIRCLE = np.array([[np.cos(a), np.sin(a), 0] for a in np.linspace(0, 2 * np.pi, 64)])
 _SQUARE = np.array([[x, y, 0.0] for x, y in product((-1, 1), repeat=2)])
 _CUBE = np.array(list(product((-1.0, 1.0), repeat=3)))
@@ -40,14 +43,26 @@ def scene_box(source: Source, motions: dict[Element, Motion]) -> Box:
 
 def _corners(source: Source, shape: Element, motion: Motion | None) -> Values:
     """[n, 3]: the corners of a shape's boxes at all the places it may stand."""
-    corners = _box_corners(_points(source, shape))
-    return corners if motion is None or not len(corners) else motion.sweep(corners)
+    try:
+        with np.errstate(divide="raise", over="raise", invalid="raise"):
+            corners = _box_corners(_points(source, shape))
+            corners = corners if motion is None or not len(corners) else motion.sweep(corners)
+    except FloatingPointError as error:
+        message = f"where it stands cannot be computed ({error}); correct its numbers"
+        raise source.error(shape, message) from None
+    if not (np.abs(corners) < FARTHEST).all():
+        message = f"it reaches farther than {FARTHEST:g} from the origin; correct its numbers"
+        raise source.error(shape, message)
+    return corners
 
 
 def _points(source: Source, shape: Element) -> Values:
     """[n, 3] in world space, whose box is the shape's."""
     if shape.get("type") == "instance":
         members = group_of(source, shape).findall("shape")
+        for member in members:
+            if member.get("type") == "instance":
+                raise source.error(member, "an instance cannot be part of a shapegroup")
         points = np.concatenate([np.zeros((0, 3)), *(_points(source, m) for m in members)])
         points = _box_corners(points)
     else:
@@ -137,7 +152,7 @@ def _file(source: Source, shape: Element) -> Path:
     name = shape.find("string[@name='filename']")
     if name is None:
         raise source.error(shape, "names no file; give <string name='filename' value='...'/>")
-    return source.document.path.parent / source.document.value(name)
+    return source.document.path.parent / name.get("value", "")
 
 
 def _child(source: Source, shape: Element, name: str, z: float) -> Vector:

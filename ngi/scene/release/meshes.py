@@ -30,15 +30,19 @@ _TYPES = {
 
 
 def ply_vertices(path: Path) -> Values:
-    """[n, 3]; ValueError for a file that does not begin with its vertices."""
+    """[n, 3]; ValueError for a file that does not begin with its vertices, or has fewer."""
     with path.open("rb") as file:
         order, count, properties = _header(path, file)
         names = [name for name, _ in properties]
         if not {"x", "y", "z"} <= set(names):
             raise ValueError(f"{path}: its vertices have no x, y, z, only {names}")
+        if not 0 <= count <= path.stat().st_size:
+            raise ValueError(f"{path}: {count} vertices in a file of {path.stat().st_size} bytes")
         if order is None:
-            rows = np.array([file.readline().split() for _ in range(count)], dtype=np.float64)
-            return rows.reshape(count, -1)[:, [names.index(axis) for axis in "xyz"]]
+            rows = _numbers(path, [file.readline().split()[: len(names)] for _ in range(count)])
+            return rows.reshape(count, len(names))[:, [names.index(axis) for axis in "xyz"]]
+        if len(set(names)) < len(names):
+            raise ValueError(f"{path}: its vertices have a property twice: {names}")
         dtype = np.dtype([(name, order + _TYPES[kind]) for name, kind in properties])
         data = file.read(count * dtype.itemsize)
     if len(data) < count * dtype.itemsize:
@@ -63,7 +67,9 @@ def _header(path: Path, file: BinaryIO) -> tuple[str | None, int, list[tuple[str
                 elements += 1
                 if elements == 1 and name != "vertex":
                     raise ValueError(f"{path}: it begins with '{name}' instead of vertices")
-                count = int(number) if elements == 1 else count
+                if not number.isdecimal():
+                    raise ValueError(f"{path}: '{number[:40]}' elements of '{name}'")
+                count = int(number[:18]) if elements == 1 else count
             case ["property", *_] if elements > 1:
                 pass
             case ["property", kind, name] if kind in _TYPES:
@@ -77,4 +83,14 @@ def obj_vertices(path: Path) -> Values:
     """[n, 3]."""
     with path.open("rb") as file:
         rows = [line.split()[1:4] for line in file if line.startswith(b"v ")]
-    return np.array(rows, dtype=np.float64).reshape(-1, 3)
+    return _numbers(path, rows).reshape(-1, 3)
+
+
+def _numbers(path: Path, rows: list[list[bytes]]) -> Values:
+    """[n, k]; ValueError where a row has other numbers of numbers, or none."""
+    try:
+        return np.array(rows, dtype=np.float64)
+    except ValueError as error:
+        raise ValueError(
+            f"{path}: its vertices are no numbers, or not of one count: {error}"
+        ) from None

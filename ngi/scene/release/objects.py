@@ -33,7 +33,11 @@ class Objects:
         return [e for e in self.shapes("instance") if group_of(self.source, e) is group]
 
     def by_id(self, object_id: str) -> Element:
-        return next(e for e in self.root.iter() if e.tag != "ref" and e.get("id") == object_id)
+        """Raises ValueError for an id that no object has."""
+        for element in self.root.iter():
+            if element.tag != "ref" and element.get("id") == object_id:
+                return element
+        raise ValueError(f"{self.source.document.path}: no object has the id '{object_id}'")
 
     def new_id(self, like: str) -> str:
         """An id that no object has yet: the one asked for, or with a number behind it."""

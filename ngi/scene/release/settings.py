@@ -31,7 +31,7 @@ def rewrite_integrator(source: Source) -> None:
         integrator = inner
     integrator.attrib.pop("name", None)
     for child in list(integrator):
-        name, value = child.get("name"), source.document.value(child)
+        name, value = child.get("name"), child.get("value", "")
         if name == "samples_per_pass":
             integrator.remove(child)
         elif name == "hide_emitters" and value == "true":
@@ -57,7 +57,7 @@ def rewrite_sensor(source: Source) -> int:
             source.document.path,
             width,
             height,
-            "its height" if _fov_axis(source, sensor) == "y" else "its width",
+            "its height" if _fov_axis(sensor) == "y" else "its width",
         )
         size["height"].set("value", str(width))
     samples = sensor.find("sampler/integer[@name='sample_count']")
@@ -80,6 +80,6 @@ def _positive(source: Source, element: Element) -> int:
     return value
 
 
-def _fov_axis(source: Source, sensor: Element) -> str:
+def _fov_axis(sensor: Element) -> str:
     axis = sensor.find("string[@name='fov_axis']")
-    return "x" if axis is None else source.document.value(axis)
+    return "x" if axis is None else axis.get("value", "")

@@ -6,10 +6,10 @@ import re
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
-from xml.etree.ElementTree import Element, TreeBuilder
-from xml.parsers import expat
+from xml.etree.ElementTree import Element
 
-from ngi.scene.scene_files import SceneFile, file_references
+from ngi.scene.scene_files import SceneFile, check_files
+from ngi.scene.xml_file import Lines, read_xml
 from ngi.scene.yaml_keys import Vector
 
 
@@ -18,7 +18,7 @@ class Source:
     """A parsed file; `document` is what becomes of it, `lines` where each element begins."""
 
     document: SceneFile
-    lines: dict[Element, int]
+    lines: Lines
 
     @property
     def root(self) -> Element:
@@ -31,7 +31,7 @@ class Source:
 
     def numbers(self, element: Element, attribute: str = "value") -> Vector:
         """The numbers of an attribute, with commas or spaces between them."""
-        text = self.document.value(element, attribute)
+        text = element.get(attribute, "")
         try:
             values = tuple(float(part) for part in re.split(r"[\s,]+", text.strip()))
         except ValueError:
@@ -65,24 +65,13 @@ class Source:
 
 
 def read_source(path: Path) -> Source:
-    """Raises FileNotFoundError for no file and ValueError, with the line, for broken XML."""
+    """Raises FileNotFoundError for files that are not there, and ValueError, with the line, for
+    broken XML and for files that it must not read.
+    """
     if not path.is_file():
         raise FileNotFoundError(f"{path}: no such scene file; scene.path names its folder or it")
-    builder, parser = TreeBuilder(), expat.ParserCreate()
-    lines: dict[Element, int] = {}
-
-    def start(tag: str, attributes: dict[str, str]) -> None:
-        lines[builder.start(tag, attributes)] = parser.CurrentLineNumber
-
-    parser.StartElementHandler = start
-    parser.EndElementHandler = builder.end
-    try:
-        parser.Parse(path.read_bytes(), True)
-    except expat.ExpatError as error:
-        raise ValueError(f"{path}: not well-formed XML: {error}; correct the file there") from None
-    root = builder.close()
-    defaults = {e.get("name", ""): e.get("value", "") for e in root.iter("default")}
-    source = Source(SceneFile(path, root, defaults), lines)
+    root, lines = read_xml(path)
+    source = Source(SceneFile(path, root), lines)
     _check(source)
     return source
 
@@ -107,13 +96,4 @@ def _check(source: Source) -> None:
             first = source.lines[seen[name]]
             raise source.error(element, f"line {first} has this id already; make them two")
         seen[name] = element
-    folder = source.document.path.parent
-    missing = [
-        f"{folder / name} (line {source.lines[element]})"
-        for _, element, attribute in file_references(source.document)
-        if not (folder / (name := source.document.value(element, attribute))).is_file()
-    ]
-    if missing:
-        raise FileNotFoundError(
-            f"{source.document.path}: names files that are not there: {', '.join(missing)}"
-        )
+    check_files(source.document, source.lines, within=source.document.path.parent)

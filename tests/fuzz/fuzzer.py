@@ -1,0 +1,102 @@
+"""Reads bad scene files and says where that goes wrong."""
+
+from __future__ import annotations
+
+import signal
+import traceback
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from random import Random
+
+from ngi.scene import SceneDescription, read_scene
+from ngi.scene.release import read_release
+from tests.fuzz.mutations import mutated
+from tests.fuzz.seeds import RELEASES, SCENES, XML, write_seed
+
+LONGEST = 5.0
+"""Seconds that reading one may take."""
+
+
+@dataclass(frozen=True)
+class Bug:
+    """number: of the input; what: an exception that is no message for users, or a hang."""
+
+    number: int
+    kind: str
+    text: bytes
+    what: str
+
+    @property
+    def place(self) -> str:
+        """The same for the same bug."""
+        lines = [line.strip() for line in self.what.splitlines() if "ngi/" in line]
+        return f"{self.kind}: {lines[-1] if lines else ''}: {self.what.splitlines()[-1][:150]}"
+
+
+def make_input(number: int) -> tuple[str, bytes]:
+    """What file the input is, 'scene.yaml', 'scene.xml' or 'release', and its text."""
+    random = Random(number)
+    kind = random.choice(("scene.yaml", "scene.yaml", "scene.xml", "release", "release"))
+    seeds = {"scene.yaml": SCENES, "scene.xml": (XML.encode(),), "release": RELEASES}[kind]
+    return kind, mutated(random, random.choice(seeds), xml=kind != "scene.yaml")
+
+
+def fuzz(
+    numbers: range,
+    folder: Path,
+    *,
+    use: Callable[[SceneDescription], object] = lambda _: None,
+    longest: float = LONGEST,
+) -> Iterator[Bug]:
+    """Reads the inputs of these numbers in a folder of theirs.
+
+    use: what is done with those that can be read; raises ValueError or OSError too.
+    """
+    write_seed(folder)
+    for number in numbers:
+        kind, text = make_input(number)
+        what = read_one(folder, kind, text, use=use, longest=longest)
+        if what is not None:
+            yield Bug(number, kind, text, what)
+
+
+def read_one(
+    folder: Path,
+    kind: str,
+    text: bytes,
+    *,
+    use: Callable[[SceneDescription], object] = lambda _: None,
+    longest: float = LONGEST,
+) -> str | None:
+    """What is wrong with how one input is read; None where it is read, or refused as it should."""
+    (folder / "scene.xml").write_text(XML)
+    (folder / "scene.yaml").write_bytes(SCENES[0])
+    (folder / ("scene.xml" if kind == "release" else kind)).write_bytes(text)
+    try:
+        with _at_most(longest), warnings.catch_warnings():
+            warnings.simplefilter("error")
+            use(read_release(folder) if kind == "release" else read_scene(folder))
+    except (ValueError, OSError) as error:
+        if type(error) in (ValueError, FileNotFoundError) and str(folder) in str(error):
+            return None if len(str(error)) < 20_000 else f"a message of {len(str(error))} letters"
+        return traceback.format_exc()
+    except BaseException:
+        return traceback.format_exc()
+    return None
+
+
+@contextmanager
+def _at_most(seconds: float) -> Iterator[None]:
+    def late(*_: object) -> None:
+        raise TimeoutError(f"more than {seconds} s")
+
+    before = signal.signal(signal.SIGALRM, late)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)

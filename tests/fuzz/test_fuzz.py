@@ -1,0 +1,104 @@
+"""A few of the fuzzer's inputs, and all that it has found; `python -m tests.fuzz` makes more."""
+
+from __future__ import annotations
+
+import logging
+
+import pytest
+
+from ngi.scene import read_scene
+from ngi.scene.loading import load
+from ngi.scene.release import read_release
+from ngi.scene.scene_files import read_scene_file
+from ngi.scene.variable_scene import VariableScene
+from tests.fuzz.fuzzer import fuzz, read_one
+from tests.fuzz.seeds import RELEASES, SCENES, XML, write_seed
+
+
+@pytest.fixture(autouse=True)
+def _quiet(caplog) -> None:
+    caplog.set_level(logging.ERROR)
+
+
+@pytest.mark.parametrize("text", SCENES)
+def test_seeds_are_good_scenes(tmp_path, text) -> None:
+    write_seed(tmp_path)
+    (tmp_path / "scene.yaml").write_bytes(text)
+    assert read_scene(tmp_path).dimensions in (9, 15)
+
+
+@pytest.mark.parametrize("text", RELEASES)
+def test_seeds_are_good_scenes_of_the_authors(tmp_path, text) -> None:
+    write_seed(tmp_path)
+    (tmp_path / "scene.xml").write_bytes(text)
+    assert read_release(tmp_path).dimensions > 1
+
+
+def test_bad_inputs_are_refused_with_a_message(tmp_path) -> None:
+    assert not list(fuzz(range(300), tmp_path / "kit"))
+
+
+def test_what_can_be_read_is_built_or_refused(tmp_path) -> None:
+    from ngi.backend import activate
+
+    def build(description) -> None:
+        activate("scalar")
+        VariableScene(description).apply([0.5] * description.dimensions)
+
+    assert not list(fuzz(range(12), tmp_path / "kit", use=build, longest=60))
+
+
+FOUND = [  # what the fuzzer has found, by what it raised
+    ("scene.yaml", SCENES[1].replace(b"size: [2, 2]", b"size: [100000, 100000]")),  # a hang
+    ("release", RELEASES[0].replace(b'<rotate x="1"', b'<rotate x="0"')),  # RuntimeWarning
+    ("release", RELEASES[2].replace(b'name="reflectance"', b'name="other"')),  # StopIteration
+    ("release", RELEASES[2].replace(b"<texture ", b"<ref ").replace(b"</texture>", b"</ref>")),
+    ("release", RELEASES[0].replace(b'scale value="6"', b'scale value="1e300"')),
+    ("release", RELEASES[1].replace(b'<ref id="balls"/>', b'<ref id="var_choice"/>')),
+    (
+        "release",  # RecursionError: an instance of the group that it is part of
+        RELEASES[1].replace(
+            b'id="balls">', b'id="balls"><shape type="instance"><ref id="balls"/></shape>'
+        ),
+    ),
+]
+
+
+@pytest.mark.parametrize(("kind", "text"), FOUND)
+def test_what_the_fuzzer_found(tmp_path, kind, text) -> None:
+    assert text not in (*SCENES, *RELEASES, XML.encode())
+    write_seed(tmp_path)
+    assert read_one(tmp_path, kind, text) is None
+
+
+def test_a_bitmap_without_a_file_does_not_crash_mitsuba(tmp_path) -> None:
+    write_seed(tmp_path)
+    named = '<string name="filename" value="a.png"/>'
+    (tmp_path / "scene.xml").write_text(XML.replace(named, "").replace(f"\n  {named}", ""))
+    with pytest.raises(ValueError, match=r"scene\.xml: <texture type='bitmap'> names no file"):
+        load(read_scene_file(tmp_path / "scene.xml"))
+
+
+PLY = "ply\nformat {} 1.0\nelement vertex {}\n{}end_header\n{}"
+XYZ = "property float x\nproperty float y\nproperty float z\n"
+
+
+@pytest.mark.parametrize(
+    ("mesh", "message"),
+    [
+        (PLY.format("ascii", 10**15, XYZ, "0 0 0\n"), "1000000000000000 vertices in a file of"),
+        (PLY.format("binary_little_endian", 10**15, XYZ, "0"), "vertices in a file of"),
+        (PLY.format("ascii", -1, XYZ, ""), "'-1' elements of 'vertex'"),
+        (PLY.format("ascii", 2, XYZ, "0 0 0\n0 0"), "not of one count"),
+        (PLY.format("ascii", 1, XYZ, "0 0 a\n"), "are no numbers"),
+        (PLY.format("ascii", 1, XYZ, "0 0 nan\n"), "reaches farther than"),
+        (PLY.format("ascii", 1, XYZ.replace(" y", " x"), "0 0 0"), "have no x, y, z"),
+        (PLY.format("binary_little_endian", 1, XYZ * 2, "0" * 99), "a property twice"),
+    ],
+)
+def test_meshes_of_nonsense(tmp_path, mesh, message) -> None:
+    write_seed(tmp_path)
+    (tmp_path / "scene.xml").write_bytes(RELEASES[0])
+    (tmp_path / "a.ply").write_text(mesh)
+    with pytest.raises(ValueError, match=message):
+        read_release(tmp_path)
