@@ -20,6 +20,7 @@ from omegaconf import DictConfig, OmegaConf, open_dict
 from tabulate import tabulate
 
 from ngi.build import build_module, build_stream, plain, run_components
+from ngi.config_values import check_values
 from ngi.memory import keep_freed_memory
 from ngi.resources import cache_folder, root
 from ngi.train import register
@@ -46,6 +47,7 @@ def measure(config: DictConfig) -> None:
     patches of closed formulas, with buffers and variables as the scene's. Raises ValueError for a
     cost file that is damaged and for what `ngi.train` refuses too.
     """
+    check_values(config)
     from ngi import learn
 
     settings = {**plain(config), "seed": None, "run": None, "label": None}
