@@ -11,6 +11,10 @@ PARTIAL_SUFFIX = ".partial"
 """Of files that are being written; one that is left was cut short and means nothing."""
 
 
+class DamagedError(ValueError):
+    """A file's content is not what was written into it, or the file is gone."""
+
+
 @contextmanager
 def full_disk_named(path: Path) -> Iterator[None]:
     """An OSError inside gets the file's name and what to do about it."""
@@ -25,11 +29,16 @@ def full_disk_named(path: Path) -> Iterator[None]:
         ) from error
 
 
-def write_atomically(path: Path, content: bytes | memoryview) -> None:
+def write_atomically(
+    path: Path, content: bytes | memoryview, *, keep_old_as: Path | None = None
+) -> None:
     """Replaces a file so that a crash at any time leaves either the old content or the new one.
 
+    keep_old_as: gets the old content, in the same folder; a crash may leave just that, under that
+        name. None: the old content goes.
+
     Once it returns the file survives a power cut. Raises OSError with what to do where the disk
-    is full; the old file stays then, and no half file does.
+    is full; the old files stay then, and no half file does.
     """
     partial = path.with_name(path.name + PARTIAL_SUFFIX)
     try:
@@ -38,6 +47,8 @@ def write_atomically(path: Path, content: bytes | memoryview) -> None:
                 stream.write(content)
                 stream.flush()
                 os.fsync(stream.fileno())
+            if keep_old_as is not None and path.exists():
+                os.replace(path, keep_old_as)
             os.replace(partial, path)
             _fsync_folder(path.parent)
     except OSError:
