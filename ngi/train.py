@@ -117,7 +117,9 @@ def _train(
             checkpoint_seconds=config.run.checkpoint_seconds,
             checkpoint_steps=config.run.checkpoint_steps,
         ),
-        plugins=[learn.AtomicCheckpointIO(identity=folder.identity)],
+        plugins=[
+            learn.AtomicCheckpointIO(identity=folder.identity, previous=folder.previous_checkpoint)
+        ],
     )
     datamodule = learn.ExplorationDataModule(stream=stream)
     module.rehearse(
