@@ -20,14 +20,17 @@ from tests.learn.comparison import assert_same_run
 from tests.learn.forked import configuration, run
 
 FLIPS = 60
+FORGETFUL = ("reuse.store.capacity=12", "budget.steps=47")
+"""The older checkpoint needs patches that the newer one has forgotten."""
 
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A run of 40 steps with checkpoints of steps 35 and 40."""
+    """A run of 47 steps with checkpoints of steps 42 and 47."""
     folder = tmp_path_factory.mktemp("finished")
-    status, output = run(configuration(folder), folder / "output")
+    status, output = run(configuration(folder, *FORGETFUL), folder / "output")
     assert status == 0, output
+    assert segments(folder / "run" / "previous.ckpt") - segments(folder / "run" / "last.ckpt")
     return folder
 
 
@@ -73,7 +76,7 @@ def test_a_flipped_bit_anywhere_is_found_and_the_older_one_is_used(copy: Path) -
         for name, content in whole.items():
             (copy / name).write_bytes(content)
         flip(copy / "last.ckpt", position)
-        assert resume(copy) == 35, position
+        assert resume(copy) == 42, position
         assert (copy / "last.ckpt").read_bytes() == whole["previous.ckpt"]
         assert not (copy / "previous.ckpt").exists()
 
@@ -92,13 +95,13 @@ def test_a_run_with_a_damaged_file_ends_like_a_whole_one(
         os.truncate(file, 1000)
     else:
         flip(file, file.stat().st_size // 2)
-    config = configuration(tmp_path, references=finished / "references")
+    config = configuration(tmp_path, *FORGETFUL, references=finished / "references")
     status, output = run(config, tmp_path / "output")
     assert status == 0, output
     (warning,) = [line for line in output.splitlines() if "the checkpoint before it" in line]
     assert str(file) in warning
     assert "damaged" in warning or "gone" in warning
-    assert "going on from step 35; 5 steps after it were lost and are done again" in output
+    assert "going on from step 42; 5 steps after it were lost and are done again" in output
     assert_same_run(copy, finished / "run")
 
 
@@ -123,8 +126,8 @@ def test_a_crash_between_two_renames_leaves_the_older_one(copy: Path) -> None:
     other = json.loads((copy / "settings.json").read_text()) | {"seed": 1}
     with pytest.raises(ValueError, match="seed: 0 there, 1 now"):
         RunFolder(copy, settings=other)
-    assert resume(copy) == 35
-    assert pd.read_csv(copy / "steps.csv")["step"].iloc[-1] == 35
+    assert resume(copy) == 42
+    assert pd.read_csv(copy / "steps.csv")["step"].iloc[-1] == 42
 
 
 class Malicious:

@@ -106,7 +106,7 @@ def small_disk(folder: Path, stack: ExitStack) -> bool:
     return allowed
 
 
-@pytest.fixture(params=[20, 100, 150, 200])
+@pytest.fixture(params=[100, 400, 700, 1000])
 def nearly_full(
     request: pytest.FixtureRequest, tmp_path: Path
 ) -> Iterator[tuple[Path, Callable[[], object] | None, Callable[[], None]]]:

@@ -113,6 +113,8 @@ def test_sigterm_in_the_middle_of_anything(
         assert_no_step_is_lost(tmp_path / "run")
         steps = pd.read_csv(tmp_path / "run" / "steps.csv")["step"]
         assert steps.iloc[-1] == step
+        if method == "predict":
+            assert len(pd.read_csv(tmp_path / "run" / "metrics.csv")) == 1, "it was broken off"
     status, output = run(config, tmp_path / "output")
     assert status == 0, output
     assert_same_run(tmp_path / "run", unbroken / "run")
@@ -122,11 +124,14 @@ def test_sigterm_in_the_middle_of_anything(
 def test_a_signal_ends_the_whole_sweep(tmp_path: Path, number: signal.Signals, status: int) -> None:
     endless = ("budget.steps=100000", "run.checkpoint_steps=7", "seed=0,1")
     process = start(tmp_path, *endless, options=("--multirun",), base=SMALL)
-    while not (found := [*tmp_path.rglob("last.ckpt")]):
-        assert process.poll() is None, process.communicate()[0]
-        time.sleep(0.01)
-    process.send_signal(number)
-    output = process.communicate(timeout=30)[0]
+    try:
+        while not (found := [*tmp_path.rglob("last.ckpt")]):
+            assert process.poll() is None, process.communicate()[0]
+            time.sleep(0.01)
+        process.send_signal(number)
+        output = process.communicate(timeout=30)[0]
+    finally:
+        process.kill()
     assert process.returncode == status, output
     assert f"ended by {number.name}; the same command goes on" in output
     assert "interrupted, and saved at step" in output
