@@ -13,6 +13,10 @@ PARTIAL_SUFFIX = ".partial"
 """Of files that are being written; one that is left was cut short and means nothing."""
 
 
+class DamagedError(ValueError):
+    """A file's content is not what was written into it, or the file is gone."""
+
+
 @contextmanager
 def full_disk_named(path: Path) -> Iterator[None]:
     """An OSError inside gets the file's name and what to do about it."""
@@ -27,11 +31,16 @@ def full_disk_named(path: Path) -> Iterator[None]:
         ) from error
 
 
-def write_atomically(path: Path, content: bytes | memoryview) -> None:
+def write_atomically(
+    path: Path, content: bytes | memoryview, *, keep_old_as: Path | None = None
+) -> None:
     """Replaces a file so that a crash at any time leaves either the old content or the new one.
 
+    keep_old_as: gets the old content, in the same folder; a crash may leave just that, under that
+        name. None: the old content goes.
+
     Once it returns the file survives a power cut. Raises OSError with what to do where the disk
-    is full; the old file stays then, and no half file does.
+    is full; the old files stay then, and no half file does.
     """
     partial = path.with_name(path.name + PARTIAL_SUFFIX)
     try:
@@ -40,6 +49,8 @@ def write_atomically(path: Path, content: bytes | memoryview) -> None:
                 stream.write(content)
                 stream.flush()
                 os.fsync(stream.fileno())
+            if keep_old_as is not None and path.exists():
+                os.replace(path, keep_old_as)
             os.replace(partial, path)
             _fsync_folder(path.parent)
     except OSError:
@@ -49,13 +60,17 @@ def write_atomically(path: Path, content: bytes | memoryview) -> None:
 
 def write_tensors(path: Path, content: dict[str, Any]) -> None:
     """`write_atomically` of what `torch.load` reads; the folder is made where it is missing."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_atomically(path, serialised(content).getbuffer())
+
+
+def serialised(content: dict[str, Any]) -> io.BytesIO:
+    """What torch.save writes, which in a file would hide the OSError of a full disk."""
     import torch
 
-    # torch.save hides the OSError of a full disk behind an internal RuntimeError: go by memory.
-    buffer = io.BytesIO()
-    torch.save(content, buffer)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write_atomically(path, buffer.getbuffer())
+    stream = io.BytesIO()
+    torch.save(content, stream)
+    return stream
 
 
 def _fsync_folder(folder: Path) -> None:

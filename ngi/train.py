@@ -26,7 +26,7 @@ from ngi.run_name import run_group, run_name
 from ngi.scene import scenes
 
 if TYPE_CHECKING:
-    from ngi.learn import Budget, Costs, RunFolder, Tracker
+    from ngi.learn import Budget, Costs, Interruption, RunFolder, Tracker
     from ngi.render import Renderer
 
 log = logging.getLogger(__name__)
@@ -53,32 +53,38 @@ def train(config: DictConfig) -> dict[str, Any]:
     """Runs, or resumes, the run that `config` describes and returns its result.
 
     A finished run is not run again. Raises ValueError for a configuration, scene, folder or
-    checkpoint that does not fit, before any long work.
+    checkpoint that does not fit, before any long work; `Interrupted` after SIGTERM or SIGINT.
     """
     from ngi import learn  # PyTorch and Lightning take seconds that --help need not wait for
 
     keep_freed_memory()
     check_values(config)
-    budget = instantiate(config.budget)
-    renderer = instantiate(config.renderer)
-    costs = run_costs(config, budget=budget, renderer=renderer)
-    settings = _settings(config, scene_hash=renderer.scene_hash, costs=costs)
-    folder = learn.RunFolder(Path(config.run.folder), settings=settings)
-    tracker = instantiate(config.tracker)
-    try:
-        if folder.result is not None:
-            log.info("%s is finished already; delete the folder to run it again", folder.path)
-            return folder.result
-        return _train(config, budget=budget, renderer=renderer, folder=folder, tracker=tracker)
-    finally:
-        with ExitStack() as stack:  # closes each, whatever happens in the others
-            stack.callback(renderer.close)
-            stack.callback(folder.close)
-            stack.callback(tracker.finish, failed=sys.exc_info()[0] is not None)
+    with learn.Interruption(of=config.run.folder) as interruption:
+        budget = instantiate(config.budget)
+        renderer = instantiate(config.renderer)
+        costs = run_costs(config, budget=budget, renderer=renderer)
+        settings = _settings(config, scene_hash=renderer.scene_hash, costs=costs)
+        folder = learn.RunFolder(Path(config.run.folder), settings=settings)
+        tracker = instantiate(config.tracker)
+        try:
+            if folder.result is not None:
+                log.info("%s is finished already; delete the folder to run it again", folder.path)
+                return folder.result
+            return _train(config, budget, renderer, folder, tracker, interruption)
+        finally:
+            with ExitStack() as stack:  # closes each, whatever happens in the others
+                stack.callback(renderer.close)
+                stack.callback(folder.close)
+                stack.callback(tracker.finish, failed=sys.exc_info()[0] is not None)
 
 
 def _train(
-    config: DictConfig, *, budget: Budget, renderer: Renderer, folder: RunFolder, tracker: Tracker
+    config: DictConfig,
+    budget: Budget,
+    renderer: Renderer,
+    folder: RunFolder,
+    tracker: Tracker,
+    interruption: Interruption,
 ) -> dict[str, Any]:
     from ngi import learn
     from ngi.patches import Patches
@@ -97,9 +103,9 @@ def _train(
         else instantiate(config.evaluation.target_map)(
             renderer=renderer,
             resolution=instantiate(config.resolution).resolution(0),
-            signals=module.signals,
+            signals=interruption.checked(module.signals),
         ),
-        predict=module.predict,
+        predict=interruption.checked(module.predict),
         folder=folder,
         stream=stream,
         clock=clock,
@@ -122,8 +128,11 @@ def _train(
             evaluations=config.evaluation.count,
             checkpoint_seconds=config.run.checkpoint_seconds,
             checkpoint_steps=config.run.checkpoint_steps,
+            interruption=interruption,
         ),
-        plugins=[learn.AtomicCheckpointIO(identity=folder.identity)],
+        plugins=[
+            learn.AtomicCheckpointIO(identity=folder.identity, previous=folder.previous_checkpoint)
+        ],
     )
     datamodule = learn.ExplorationDataModule(stream=stream)
     module.rehearse(
@@ -138,7 +147,8 @@ def _train(
     folder.begin()
     recorder.prepare()
     renderer.warm_up()
-    trainer.fit(module, datamodule, ckpt_path=checkpoint, weights_only=True)
+    with interruption.deferred():
+        trainer.fit(module, datamodule, ckpt_path=checkpoint, weights_only=True)
     module.to(trainer.strategy.root_device)  # Lightning has taken it back to the CPU
     for optimizer in trainer.optimizers:
         optimizer.load_state_dict(optimizer.state_dict())  # moves its state to the weights

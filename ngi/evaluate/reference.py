@@ -5,8 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 import os
-import zipfile
-import zlib
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,8 +13,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-UNREADABLE = (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile, zlib.error)
-"""What reading a damaged reference file may raise."""
+from ngi.durable import PARTIAL_SUFFIX, DamagedError, full_disk_named
 
 
 @dataclass(frozen=True)
@@ -70,40 +68,52 @@ def relative_noise(half_a: Tensor, half_b: Tensor, epsilon: float) -> float:
 
 
 def write_reference(path: Path, reference: Reference) -> None:
-    """Writes one .npz file atomically: a crash or a full disk leaves the old file or none."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_suffix(f".{os.getpid()}.partial")
+    """Writes one .npz file atomically: a crash or a full disk leaves the old file or none.
+
+    Several processes may write the same one. Raises OSError with what to do where that fails.
+    """
+    partial = path.with_suffix(f".{os.getpid()}{PARTIAL_SUFFIX}")
     try:
-        with partial.open("wb") as stream:
-            np.savez_compressed(
-                stream,
-                key=np.array(reference.key),
-                half_a=reference.half_a.numpy(),
-                half_b=reference.half_b.numpy(),
-                samples_per_pixel=np.array(reference.samples_per_pixel),
-                noise=np.array(reference.noise),
-                backend=np.array(reference.backend),
-            )
-            stream.flush()
-            os.fsync(stream.fileno())
-        partial.replace(path)
+        with full_disk_named(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            _write(partial, reference)
+            partial.replace(path)
     finally:
-        partial.unlink(missing_ok=True)
+        with suppress(OSError):  # of a folder that could not be made
+            partial.unlink()
+
+
+def _write(path: Path, reference: Reference) -> None:
+    with path.open("wb") as stream:
+        np.savez_compressed(
+            stream,
+            key=np.array(reference.key),
+            half_a=reference.half_a.numpy(),
+            half_b=reference.half_b.numpy(),
+            samples_per_pixel=np.array(reference.samples_per_pixel),
+            noise=np.array(reference.noise),
+            backend=np.array(reference.backend),
+        )
+        stream.flush()
+        os.fsync(stream.fileno())
 
 
 def read_reference(path: Path, *, resolution: int) -> Reference:
-    """Reads what `write_reference` wrote; raises one of `UNREADABLE` for a damaged file."""
-    # numpy would leave a damaged file open.
-    with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
-        reference = Reference(
-            key=str(file["key"]),
-            half_a=torch.from_numpy(file["half_a"]),
-            half_b=torch.from_numpy(file["half_b"]),
-            samples_per_pixel=int(file["samples_per_pixel"]),
-            noise=float(file["noise"]),
-            backend=str(file["backend"]),
-        )
+    """Reads what `write_reference` wrote; raises DamagedError where it is not that any more."""
+    try:
+        # numpy would leave a damaged file open.
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
+            reference = Reference(
+                key=str(file["key"]),
+                half_a=torch.from_numpy(file["half_a"]),
+                half_b=torch.from_numpy(file["half_b"]),
+                samples_per_pixel=int(file["samples_per_pixel"]),
+                noise=float(file["noise"]),
+                backend=str(file["backend"]),
+            )
+    except Exception as error:  # zipfile and numpy raise nearly anything on a damaged file
+        raise DamagedError(f"{path} is damaged ({type(error).__name__}: {error})") from error
     expected = (resolution, resolution, 3)
     if reference.key != path.stem or reference.half_a.shape != expected:
-        raise ValueError("its content is not what its name says")
+        raise DamagedError(f"{path} is damaged (its content is not what its name says)")
     return reference

@@ -11,9 +11,9 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
+from ngi.durable import DamagedError
 from ngi.evaluate.protocol import EvaluationProtocol
 from ngi.evaluate.reference import (
-    UNREADABLE,
     Reference,
     read_reference,
     relative_noise,
@@ -60,8 +60,8 @@ class ReferenceCache:
         if path.exists():
             try:
                 return read_reference(path, resolution=protocol.resolution)
-            except UNREADABLE as error:
-                log.warning("reference %s is damaged (%s) and is rendered again", path, error)
+            except DamagedError as error:
+                log.warning("%s; this reference is rendered again", error)
         reference = _render(renderer, protocol, scene_vector, key=key, on_pass=on_pass)
         write_reference(path, reference)
         return reference

@@ -7,6 +7,7 @@ from ngi.learn.checkpoint import AtomicCheckpointIO, prepare_resume
 from ngi.learn.clock import PhaseClock, RunClock
 from ngi.learn.costs import Component, CostFile, Costs, components
 from ngi.learn.datamodule import ExplorationDataModule
+from ngi.learn.interruption import Interrupted, Interruption
 from ngi.learn.model_clock import ModelClock
 from ngi.learn.module import IlluminationModule, seeded
 from ngi.learn.record_log import RecordLog
@@ -32,6 +33,8 @@ __all__ = [
     "ExplorationDataModule",
     "Feedback",
     "IlluminationModule",
+    "Interrupted",
+    "Interruption",
     "Local",
     "ModelClock",
     "PatchArchive",

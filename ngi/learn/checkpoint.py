@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
 import logging
 import os
@@ -10,25 +11,32 @@ from typing import Any
 
 import torch
 
-from ngi.durable import write_atomically
+from ngi.durable import DamagedError, serialised, write_atomically
+from ngi.learn.datamodule import ExplorationDataModule
 from ngi.learn.lightning_api import TorchCheckpointIO
 from ngi.learn.run_folder import RunFolder
+from ngi.reuse import PatchArchive
 
 log = logging.getLogger(__name__)
 
 IDENTITY = "run_identity"
 """Key under which a checkpoint names the run it belongs to."""
 
+CHECKSUM_BYTES = hashlib.sha256().digest_size
+"""A checkpoint file ends with the SHA-256 of what comes before; torch.load does not mind."""
+
 
 class AtomicCheckpointIO(TorchCheckpointIO):
     """Writes beside the old checkpoint, and replaces it only once the new one is on the disk.
 
     identity: the run's identity, written into the checkpoint; `prepare_resume` asks for it.
+    previous: where the replaced checkpoint is kept, in case the new one is damaged later
     """
 
-    def __init__(self, *, identity: str) -> None:
+    def __init__(self, *, identity: str, previous: Path) -> None:
         super().__init__()
         self._identity = identity
+        self._previous = previous
 
     def save_checkpoint(
         self,
@@ -36,43 +44,71 @@ class AtomicCheckpointIO(TorchCheckpointIO):
         path: str | os.PathLike[str],
         storage_options: Any | None = None,  # noqa: ARG002
     ) -> None:
-        """Raises OSError with what to do where the disk is full; the old checkpoint stays."""
+        """Raises OSError with what to do where the disk is full; the old checkpoints stay."""
         content = {**checkpoint, IDENTITY: self._identity}
-        # torch.save hides the OSError of a full disk behind an internal RuntimeError: go by memory.
-        buffer = io.BytesIO()
-        torch.save(content, buffer)
-        write_atomically(Path(path), buffer.getbuffer())
+        buffer = serialised(content)
+        buffer.write(hashlib.sha256(buffer.getbuffer()).digest())
+        write_atomically(Path(path), buffer.getbuffer(), keep_old_as=self._previous)
 
 
 def prepare_resume(folder: RunFolder) -> Path | None:
     """The checkpoint to go on from, or None for a fresh start; cuts the logs back to it.
 
-    Raises ValueError where it is damaged or belongs to another run.
+    Where the newest one, or a patch that it needs, is damaged, it is replaced by the one before it.
+    Raises ValueError where both are damaged, and where one belongs to another run; the folder is
+    left as it was then.
     """
-    path = folder.checkpoint
-    step = 0
-    if path.exists():
-        checkpoint = _read(path, identity=folder.identity)
-        step = checkpoint["global_step"]
-        log.info("%s: going on from step %d", folder.path, step)
-    for log_file in folder.logs:
-        log_file.keep_until(step)
-    return path if path.exists() else None
+    checkpoint = _newest_usable(folder)
+    step = 0 if checkpoint is None else checkpoint["global_step"]
+    dropped = {log_file: log_file.keep_until(step) for log_file in folder.logs}
+    if checkpoint is None:
+        return None
+    log.info(
+        "%s: going on from step %d; %d steps after it were lost and are done again",
+        folder.path,
+        step,
+        dropped[folder.steps],
+    )
+    return folder.checkpoint
 
 
-def _read(path: Path, *, identity: str) -> dict[str, Any]:
-    try:
-        checkpoint = torch.load(path, map_location="cpu", weights_only=True)
-    except Exception as error:
+def _newest_usable(folder: RunFolder) -> dict[str, Any] | None:
+    """What `folder.checkpoint` holds once it is one that can be used; None where there is none."""
+    problems = []
+    for path in (folder.checkpoint, folder.previous_checkpoint):
+        if not path.exists():
+            continue
+        try:
+            checkpoint = _read(path, folder)
+        except DamagedError as error:
+            problems.append(str(error))
+            continue
+        for problem in problems:
+            log.warning("%s; the checkpoint before it is used", problem)
+        os.replace(path, folder.checkpoint)
+        return checkpoint
+    if problems:
         raise ValueError(
-            f"{path} is damaged ({type(error).__name__}: {error}); put back a copy, or delete it "
-            "and the same command starts the run afresh"
-        ) from error
-    if not isinstance(checkpoint, dict) or IDENTITY not in checkpoint:
-        raise ValueError(f"{path} is no checkpoint of this program; remove it from the folder")
-    if checkpoint[IDENTITY] != identity:
-        raise ValueError(
-            f"{path} belongs to run {checkpoint[IDENTITY]}, this is run {identity} (another scene "
-            "or configuration); choose another folder with run.folder=…, or delete the checkpoint"
+            f"{'; '.join(problems)}; put back a copy, or delete every checkpoint (*.ckpt) in "
+            f"{folder.path} and the same command starts the run afresh"
         )
+    return None
+
+
+def _read(path: Path, folder: RunFolder) -> dict[str, Any]:
+    content = memoryview(path.read_bytes())
+    content, checksum = content[:-CHECKSUM_BYTES], content[-CHECKSUM_BYTES:]
+    if hashlib.sha256(content).digest() != checksum:
+        raise DamagedError(f"{path} is damaged (its checksum is not that of its content)")
+    try:
+        checkpoint = torch.load(io.BytesIO(content), map_location="cpu", weights_only=True)
+    except Exception as error:  # torch.load raises nearly anything; its advice is to execute code
+        raise DamagedError(f"{path} can not be read ({type(error).__name__})") from error
+    if checkpoint[IDENTITY] != folder.identity:
+        raise ValueError(
+            f"{path} belongs to run {checkpoint[IDENTITY]}, this is run {folder.identity} (another "
+            "scene or configuration); choose another folder with run.folder=…, or delete the "
+            "checkpoint"
+        )
+    PatchArchive(folder.patches).check(checkpoint[ExplorationDataModule.__qualname__]["store"])
     return checkpoint

@@ -47,7 +47,10 @@ class RunClock(Protocol):
 class PhaseClock:
     """Wall-clock seconds by phase; phases nest, and only the innermost one runs.
 
-    `seconds` maps every phase to its seconds so far. The clock stands still until `start`.
+    `seconds` maps every phase to its seconds so far. The clock stands still until `start`. Setting
+    the system's clock changes nothing, and time that the machine sleeps does not count on Linux.
+    Time that the process is stopped (SIGSTOP, Ctrl-Z) does: nothing tells it how long it stood
+    still. To pause a run, end it (Ctrl-C) and start it again.
 
     energy: is started and stopped with run time; None where nobody asks for it
     """

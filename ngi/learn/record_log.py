@@ -38,7 +38,8 @@ class RecordLog(GrowingFile[BinaryIO]):
         arrays = {name: np.asarray(value) for name, value in record.items()}
         dtype = np.dtype([(name, array.dtype, array.shape) for name, array in arrays.items()])
         if self._stream is None:
-            self._open(dtype)
+            with full_disk_named(self.path):
+                self._open(dtype)
         assert self._stream is not None
         if dtype != self._dtype:
             raise ValueError(
@@ -48,22 +49,27 @@ class RecordLog(GrowingFile[BinaryIO]):
         with full_disk_named(self.path):
             self._stream.write(b"".join(array.tobytes() for array in arrays.values()))
 
-    def keep_until(self, step: int) -> None:
-        """Drops records after `step`: what a run did after its last checkpoint is done again."""
+    def keep_until(self, step: int) -> int:
+        """Drops records after `step` and returns how many.
+
+        What a run did after its last checkpoint is done again.
+        """
         self.close()
         if not self.path.exists():
-            return
+            return 0
         with self.path.open("rb") as stream:
             dtype = self._read_header(stream)
             if dtype is None:
-                size = 0
+                size = dropped = 0
             else:
                 start = stream.tell()
                 steps = np.fromfile(stream, dtype)["step"]  # a record cut short is left out
                 # What a power cut leaves may be zeros: only what ascends from the start counts.
                 good = (steps <= step) & (np.diff(steps, prepend=-1) > 0)
-                size = start + dtype.itemsize * int(np.logical_and.accumulate(good).sum())
+                kept = int(np.logical_and.accumulate(good).sum())
+                size, dropped = start + dtype.itemsize * kept, len(steps) - kept
         os.truncate(self.path, size)
+        return dropped
 
     def _open(self, dtype: np.dtype) -> None:
         if self.path.exists():
@@ -75,8 +81,7 @@ class RecordLog(GrowingFile[BinaryIO]):
         self._dtype = dtype if dtype_there is None else dtype_there
         if dtype_there is None:
             header = {"description": self._description, "fields": _fields(dtype)}
-            with full_disk_named(self.path):
-                self._stream.write(json.dumps(header).encode() + b"\n")
+            self._stream.write(json.dumps(header).encode() + b"\n")
 
     def _read_header(self, stream: BinaryIO) -> np.dtype | None:
         """None where the first line was cut short, before any record was written."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from ngi.durable import full_disk_named
 from ngi.evaluate import Evaluation, Evaluator
 from ngi.evaluate.evaluator import Predict
 from ngi.learn.clock import PhaseClock, RunClock
@@ -57,6 +58,10 @@ class Recorder:
     def evaluate(self) -> Evaluation:
         """Evaluates the network as it is, and appends a row to metrics.csv."""
         with self._clock.phase("evaluate"):
+            # Killed after this row and before the next checkpoint or the result, a resumed run
+            # evaluates again.
+            for log in (self._folder.metrics, self._folder.target_maps):
+                log.keep_until(self._stream.counters.iteration - 1)
             evaluation = self._evaluator.evaluate(self._predict)
             densities = None if self._target_map is None else self._target_map.measure()
         row: dict[str, Any] = {
@@ -80,11 +85,9 @@ class Recorder:
 
     def finish(self) -> dict[str, Any]:
         """The last evaluation, with pictures; writes and returns the result."""
-        # Killed between the last row and the result, a resumed run would write that row twice.
-        for log in (self._folder.metrics, self._folder.target_maps):
-            log.keep_until(self._stream.counters.iteration - 1)
         evaluation = self.evaluate()
-        evaluation.write_pictures(self._folder.pictures)
+        with full_disk_named(self._folder.pictures):
+            evaluation.write_pictures(self._folder.pictures)
         counters = self._stream.counters
         result = {
             **provenance(backend=self._backend),

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TextIO
 
-from ngi.durable import full_disk_named
+from ngi.durable import full_disk_named, write_atomically
 from ngi.learn.growing_file import GrowingFile
 
 
@@ -23,21 +23,24 @@ class RowLog(GrowingFile[TextIO]):
         self._writer: csv.DictWriter[str] | None = None
 
     def append(self, row: Mapping[str, object]) -> None:
-        if self._stream is None:
-            self._open(list(row))
-        assert self._writer is not None
         with full_disk_named(self.path):
+            if self._stream is None:
+                self._open(list(row))
+            assert self._writer is not None
             self._writer.writerow(row)
 
-    def keep_until(self, step: int) -> None:
-        """Drops rows after `step`: what a run did after its last checkpoint is done again."""
+    def keep_until(self, step: int) -> int:
+        """Drops rows after `step` and returns how many.
+
+        What a run did after its last checkpoint is done again.
+        """
         self.close()
         if not self.path.exists():
-            return
+            return 0
         with self.path.open(newline="") as stream:
             lines = stream.readlines()
         if not lines:
-            return
+            return 0
         position = next(csv.reader(lines[:1])).index("step")
         kept = lines[:1]
         for line in lines[1:]:
@@ -46,9 +49,8 @@ class RowLog(GrowingFile[TextIO]):
             whole = line.endswith("\n") and len(fields) > position and fields[position].isdigit()
             if whole and int(fields[position]) <= step:
                 kept.append(line)
-        temporary = self.path.with_name(self.path.name + ".tmp")
-        temporary.write_text("".join(kept))
-        temporary.replace(self.path)
+        write_atomically(self.path, "".join(kept).encode())
+        return len(lines) - len(kept)
 
     def _open(self, columns: list[str]) -> None:
         continued = self.path.exists() and self.path.stat().st_size > 0

@@ -21,7 +21,8 @@ class RunFolder:
     settings: everything that decides the result (resolved configuration, scene hash, version),
         as plain JSON data.
     Raises ValueError where the folder holds another run, RuntimeError where another process is
-    training in it. Nothing in the folder is touched before that is known.
+    training in it, OSError where it can not be written to. Nothing in the folder is touched before
+    that is known.
     """
 
     def __init__(self, path: Path, *, settings: dict[str, Any]) -> None:
@@ -30,6 +31,7 @@ class RunFolder:
         canonical = json.dumps(settings, sort_keys=True)
         self.identity = hashlib.sha256(canonical.encode()).hexdigest()[:16]
         self.checkpoint = path / "last.ckpt"
+        self.previous_checkpoint = path / "previous.ckpt"
         self.patches = path / "patches"
         self.pictures = path / "pictures"
         self.metrics = RowLog(path / "metrics.csv")
@@ -39,7 +41,6 @@ class RunFolder:
         self.logs = (self.steps, self.metrics, self.chains, self.target_maps)
         self._result = path / "result.json"
         self._settings = path / "settings.json"
-        path.mkdir(parents=True, exist_ok=True)
         self._lock = self._acquire_lock()
         self._check_identity()
 
@@ -70,7 +71,16 @@ class RunFolder:
                 stack.callback(part.close)
 
     def _acquire_lock(self) -> TextIO:
-        lock = (self.path / ".lock").open("w")
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+            lock = (self.path / ".lock").open("w")
+        except OSError as error:
+            raise OSError(
+                error.errno,
+                f"{error.strerror}: this run's folder can not be written to; choose another one "
+                "with run.folder=…, or see to its permissions",
+                str(self.path),
+            ) from error
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
@@ -82,7 +92,8 @@ class RunFolder:
 
     def _check_identity(self) -> None:
         # A start that failed before its first checkpoint has nothing to lose.
-        if not (self._settings.exists() and (self.checkpoint.exists() or self._result.exists())):
+        to_lose = (self.checkpoint, self.previous_checkpoint, self._result)
+        if not (self._settings.exists() and any(file.exists() for file in to_lose)):
             return
         try:
             earlier = _flatten(json.loads(self._settings.read_text()))

@@ -98,7 +98,7 @@ class TrainingStream(IterableDataset[Batch]):
         self._policy_state = policy.init()
         self._resolution = schedule.resolution(0)  # of the latest proposals
         self._ahead: ProposalsAhead | None = None
-        self._saved_store: dict[str, Any] | None = None
+        self._saved_stores: list[dict[str, Any]] = []  # of the last two checkpoints
         self._pending: Batch | None = None
 
     def __len__(self) -> int:
@@ -161,14 +161,15 @@ class TrainingStream(IterableDataset[Batch]):
 
     def state_dict(self) -> dict[str, Any]:
         """Everything the next batch depends on; patches go to the archive, not in here."""
-        self._saved_store = self._archive.save(self.store)
+        saved = self._archive.save(self.store)
+        self._saved_stores = [*self._saved_stores[-1:], saved]
         return {
             "counters": dict(vars(self.counters)),
             "chains": self._chains.state_dict(),
             "policy": self._policy_state.state_dict(),
             "generator": self._generator.get_state(),
             "ahead": None if self._ahead is None else self._ahead.state_dict(),
-            "store": self._saved_store,
+            "store": saved,
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
@@ -179,12 +180,14 @@ class TrainingStream(IterableDataset[Batch]):
         ahead = state["ahead"]
         self._ahead = None if ahead is None else ProposalsAhead.from_state_dict(ahead)
         self._archive.restore(self.store, state["store"])
-        self._saved_store = state["store"]
+        self._saved_stores = [state["store"]]
 
     def prune_archive(self) -> None:
-        """Deletes patches that the last saved state does not need; call it once that is on disk."""
-        if self._saved_store is not None:
-            self._archive.prune([self._saved_store])
+        """Deletes patches that neither of the last two saved states needs.
+
+        Call it once the last one is on disk.
+        """
+        self._archive.prune(self._saved_stores)
 
     def _next(self) -> Batch:
         ahead = self._propose()

@@ -10,7 +10,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from ngi.durable import PARTIAL_SUFFIX, write_tensors
+from ngi.durable import PARTIAL_SUFFIX, DamagedError, write_tensors
 from ngi.reuse.compact import CompactPatches
 from ngi.reuse.store import PatchStore
 
@@ -64,12 +64,17 @@ class PatchArchive:
     def restore(self, store: PatchStore, state: dict[str, Any]) -> None:
         """Fills the store with what `save` returned as `state`, and goes on saving from there.
 
-        Raises ValueError, and leaves the store as it was, for a missing or damaged segment, for a
-        state of another scene and for a store that is too small.
+        Raises DamagedError for a missing or damaged segment, and ValueError for a state of another
+        scene and for a store that is too small; the store is left as it was.
         """
         store.restore(state, self._read(state))
         self._segments = [dict(segment) for segment in state["segments"]]
         self._saved_until = state["next_id"]
+
+    def check(self, state: dict[str, Any]) -> None:
+        """Raises DamagedError where a segment that `state` needs is missing or damaged."""
+        for segment in state["segments"]:
+            _read_segment(self._folder / segment["name"], segment["checksum"])
 
     def prune(self, states: Iterable[dict[str, Any]]) -> list[str]:
         """Removes the files that none of these states needs and returns their names.
@@ -106,18 +111,19 @@ class PatchArchive:
 
 
 def _read_segment(path: Path, checksum: int) -> tuple[Tensor, CompactPatches]:
-    advice = "restore the file from a copy, or delete the checkpoint and start the run afresh"
     if not path.is_file():
-        raise ValueError(f"{path}: the checkpoint needs these patches, but they are gone: {advice}")
+        raise DamagedError(f"{path}: the checkpoint needs these patches, but they are gone")
     try:
         content = torch.load(path, map_location="cpu", weights_only=True)
         ids = content.pop("ids")
         compact = CompactPatches(**content)
         damaged = _checksum(ids, compact) != checksum
     except Exception as error:  # torch.load raises nearly anything on a damaged file
-        raise ValueError(f"{path}: not a readable file of patches ({error}): {advice}") from error
+        raise DamagedError(
+            f"{path} is damaged (not a readable file of patches: {type(error).__name__})"
+        ) from error
     if damaged:
-        raise ValueError(f"{path}: not the patches the checkpoint was made with: {advice}")
+        raise DamagedError(f"{path} is damaged (not the patches the checkpoint was made with)")
     return ids, compact
 
 

@@ -5,6 +5,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import ngi
+
+CHECKOUT = Path(ngi.__file__).parents[1]
+"""Of the program that the other tests import, wherever another one is installed."""
+
 SIZE = (
     "renderer=analytic",
     "renderer.patch_size=16",
@@ -27,7 +32,7 @@ def environment(folder: Path) -> dict[str, str]:
         **os.environ,
         "NGI_CACHE": str(folder / "cache"),
         "OMP_NUM_THREADS": "1",
-        "PYTHONPATH": str(folder),
+        "PYTHONPATH": os.pathsep.join([str(folder), str(CHECKOUT)]),
     }
 
 

@@ -36,6 +36,15 @@ def test_each_error_names_its_key_and_value(
     assert not (tmp_path / "run" / "steps.csv").exists()
 
 
+def test_an_unwritable_folder_is_refused_before_anything_is_rendered(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    status, output = run(tmp_path, f"run.folder={tmp_path / 'file' / 'run'}")
+    assert status == 1
+    assert f"run.folder=…, or see to its permissions: '{tmp_path / 'file' / 'run'}'" in output
+    assert "Traceback" not in output
+    assert not (tmp_path / "cache").exists()
+
+
 def test_no_seconds_are_no_budget(tmp_path: Path) -> None:
     status, output = run(tmp_path, "budget.seconds=0", base=BRIEF)
     assert status != 0
@@ -55,17 +64,6 @@ def interrupted(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def copy(interrupted: Path, to: Path) -> Path:
     shutil.copytree(interrupted / "run", to / "run")
     return to / "run"
-
-
-def test_a_damaged_checkpoint_is_refused(tmp_path: Path, interrupted: Path) -> None:
-    folder = copy(interrupted, tmp_path)
-    whole = (folder / "last.ckpt").read_bytes()
-    (folder / "last.ckpt").write_bytes(whole[: len(whole) // 2])
-    metrics = (folder / "metrics.csv").read_bytes()
-    status, output = run(tmp_path, "run.folder=run")
-    assert status != 0
-    assert "last.ckpt is damaged" in output
-    assert (folder / "metrics.csv").read_bytes() == metrics
 
 
 def test_the_checkpoint_of_another_run_is_refused(tmp_path: Path, interrupted: Path) -> None:

@@ -1,7 +1,14 @@
+import itertools
+import json
+import time
+from pathlib import Path
+
+import pandas as pd
 import pytest
 
 from ngi.energy import EnergyCounter, EnergyMeter
 from ngi.learn.clock import PAUSES, PHASES, PhaseClock
+from tests.learn.forked import configuration, run
 
 
 class FakeTimer:
@@ -119,3 +126,26 @@ def test_unknown_phase_is_named() -> None:
     with pytest.raises(KeyError, match="rendering"), PhaseClock().phase("rendering"):
         pass
     assert "render" in PHASES
+
+
+def let_the_wall_clock_jump() -> None:
+    """An hour ahead and two hours back, at every look at it."""
+    now, jumps = time.time, itertools.cycle((3600, -7200))
+    time.time = lambda: now() + next(jumps)
+
+
+def test_a_wall_clock_that_jumps_changes_no_run_time(tmp_path: Path) -> None:
+    config = configuration(tmp_path, "budget.steps=1000000", "budget.seconds=0.5")
+    since = time.monotonic()
+    status, output = run(config, tmp_path / "output", first=let_the_wall_clock_jump)
+    passed = time.monotonic() - since
+    assert status == 0, output
+    result = json.loads((tmp_path / "run" / "result.json").read_text())
+    assert 0.5 <= result["run_seconds"] < passed
+    assert 0 < result["seconds"]["evaluate"] < passed
+    steps, metrics = (
+        pd.read_csv(tmp_path / "run" / name)["run_seconds"] for name in ("steps.csv", "metrics.csv")
+    )
+    assert steps.is_monotonic_increasing
+    assert len(metrics) == 3
+    assert 0.5 / 3 <= metrics[0] < metrics[1] < metrics[2]

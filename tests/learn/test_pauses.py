@@ -6,8 +6,9 @@ from typing import Any
 
 import pytest
 
-from ngi.learn import Budget, PhaseClock, TrainingStream
-from ngi.learn.callbacks import BudgetAndCheckpoint, PeriodicEvaluation
+from ngi.learn import Budget, Interruption, PhaseClock, TrainingStream
+from ngi.learn.callbacks import PeriodicEvaluation
+from ngi.learn.saving import BudgetAndCheckpoint
 from ngi.reuse import FixedProbability
 from tests.learn.late_renderers import Manual, ManualJob
 from tests.learn.small_stream import make, steps
@@ -62,6 +63,7 @@ def test_a_checkpoint_waits_for_patches_unless_the_run_is_over(
         folder=folder,
         every_seconds=1e9,
         every_steps=5,
+        interruption=Interruption(of="a run"),
     )
     callback.on_train_start(trainer)
     module: Any = None

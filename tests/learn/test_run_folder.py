@@ -40,6 +40,15 @@ def test_two_processes_can_not_train_one_run(tmp_path: Path) -> None:
     first.close()
 
 
+@pytest.mark.parametrize("place", ["below a file", "in /proc"])
+def test_a_folder_that_can_not_be_written_to_is_named(tmp_path: Path, place: str) -> None:
+    """As root too, whom no permissions bind."""
+    (tmp_path / "file").touch()
+    path = tmp_path / "file" / "run" if place == "below a file" else Path("/proc/run")
+    with pytest.raises(OSError, match=rf"can not be written to; .*run\.folder=….*'{path}'"):
+        RunFolder(path, settings=SETTINGS)
+
+
 def test_damaged_result_is_named(tmp_path: Path) -> None:
     folder = RunFolder(tmp_path, settings=SETTINGS)
     folder.write_result({"finished": True})

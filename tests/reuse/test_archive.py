@@ -1,11 +1,13 @@
 import errno
 import os
 import re
+from functools import partial
 from pathlib import Path
 
 import pytest
 import torch
 
+from ngi.durable import DamagedError
 from ngi.patches import BufferLayout
 from ngi.reuse import PatchArchive, PatchStore
 from ngi.reuse import archive as archive_module
@@ -204,9 +206,9 @@ def saved(make_patches, folder):
 
 def assert_refused(state, folder, path, message):
     store = new_store()
-    with pytest.raises(ValueError, match=re.escape(str(path)) + ".*" + message) as caught:
-        PatchArchive(folder).restore(store, state)
-    assert "restore the file" in str(caught.value)
+    for read in (PatchArchive(folder).check, partial(PatchArchive(folder).restore, store)):
+        with pytest.raises(DamagedError, match=re.escape(str(path)) + ".*" + message):
+            read(state)
     assert len(store) == 0
 
 

@@ -1,0 +1,93 @@
+"""Whole runs in processes that start in no time, forked from one that has imported everything.
+
+They can be killed, stopped and starved as any other; a command line takes seconds to start.
+"""
+
+import copy
+import logging
+import multiprocessing
+import os
+import sys
+import threading
+from collections.abc import Callable
+from functools import cache
+from multiprocessing import forkserver
+from multiprocessing.context import ForkServerProcess
+from pathlib import Path
+from typing import Any
+from unittest import mock
+
+import torch
+from omegaconf import DictConfig, OmegaConf
+from tqdm import tqdm
+
+from ngi.train import train
+from tests.learn.command_line import SIZE
+from tests.learn.composition import run_config
+
+CONTEXT = multiprocessing.get_context("forkserver")
+PRELOADED = ["pytest", "ngi.learn", "matplotlib.pyplot", "torch._dynamo", __name__]
+
+
+@cache
+def _composed(*overrides: str) -> DictConfig:
+    config = run_config(
+        *SIZE,
+        "budget=steps",
+        "budget.steps=40",
+        "run.checkpoint_steps=7",
+        "evaluation.count=3",
+        "run.references=references",
+        *overrides,
+    )
+    return OmegaConf.create(OmegaConf.to_container(config, resolve=True))
+
+
+def configuration(folder: Path, *overrides: str, references: Path | None = None) -> DictConfig:
+    """Of a run of 40 steps that writes into `folder`/run and is evaluated thrice.
+
+    references: folder of the references, by default `folder`/references
+    """
+    config = copy.deepcopy(_composed(*overrides))
+    config.run.folder = str(folder / "run")
+    config.evaluation.evaluator.cache.folder = str(references or folder / "references")
+    return config
+
+
+def start(
+    config: DictConfig, output: Path, *, first: Callable[[], Any] | None = None
+) -> ForkServerProcess:
+    """Starts training in a process whose exit status and `output` are those of a command line.
+
+    first: called in that process before it trains
+    """
+    CONTEXT.set_forkserver_preload(PRELOADED)
+    with mock.patch.dict(os.environ, PYTHONPATH=os.pathsep.join(sys.path), OMP_NUM_THREADS="1"):
+        forkserver.ensure_running()
+    process = CONTEXT.Process(target=_work, args=(config, output, first))
+    process.start()
+    return process
+
+
+def run(
+    config: DictConfig, output: Path, *, first: Callable[[], Any] | None = None
+) -> tuple[int, str]:
+    """Exit status, and everything printed by this and earlier runs with the same `output`."""
+    process = start(config, output, first=first)
+    process.join(timeout=120)
+    if process.exitcode is None:
+        process.kill()
+        raise TimeoutError(output.read_text())
+    return process.exitcode, output.read_text()
+
+
+def _work(config: DictConfig, output: Path, first: Callable[[], Any] | None) -> None:
+    with output.open("a") as stream:
+        for descriptor in (1, 2):
+            os.dup2(stream.fileno(), descriptor)
+    logging.basicConfig(level=logging.INFO, format="%(message)s", force=True)
+    torch.set_num_threads(1)
+    tqdm.set_lock(threading.RLock())  # its own is a semaphore that a killed process leaves behind
+    if first is not None:
+        first()
+    train(config)

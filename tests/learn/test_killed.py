@@ -1,0 +1,70 @@
+"""SIGKILL at any time loses nothing: the same command ends as if nothing had happened."""
+
+import itertools
+import random
+import time
+from collections import Counter
+from multiprocessing.context import ForkServerProcess
+from pathlib import Path
+
+from tests.learn.comparison import assert_same_run
+from tests.learn.forked import configuration, run, start
+
+KILLS = 50
+WRITING = 0.3
+"""Share of the kills that wait until a file is being written."""
+
+
+def killed(process: ForkServerProcess, folder: Path, *, after: float, writing: bool) -> bool:
+    """Kills it after some seconds, at its next write if so wished; False where it ended before."""
+    since = time.monotonic()
+    while process.is_alive():
+        due = time.monotonic() - since >= after
+        if due and (not writing or any(folder.rglob("*.partial"))):
+            process.kill()
+            break
+        time.sleep(0.0005)
+    process.join()
+    assert process.exitcode in (0, -9), process.exitcode
+    return process.exitcode != 0
+
+
+def test_runs_killed_at_50_moments_end_bit_for_bit_like_an_unbroken_one(tmp_path: Path) -> None:
+    unbroken = tmp_path / "unbroken"
+    unbroken.mkdir()
+    run(configuration(unbroken), tmp_path / "first")  # the first process waits for the imports
+    (unbroken / "run").rename(unbroken / "first")
+    since = time.monotonic()
+    assert run(configuration(unbroken), tmp_path / "second")[0] == 0
+    life = time.monotonic() - since
+    assert_same_run(unbroken / "run", unbroken / "first")
+
+    generator = random.Random(5)
+    moments: Counter[str] = Counter()
+    for folder in (tmp_path / f"run{number}" for number in itertools.count()):
+        folder.mkdir()
+        shared = unbroken / "references" if generator.random() < 0.5 else None
+        config = configuration(folder, references=shared)
+        while moments.total() < KILLS and killed(
+            start(config, folder / "output"),
+            folder,
+            after=generator.uniform(0, life),
+            writing=generator.random() < WRITING,
+        ):
+            moments[moment(folder)] += 1
+        if moments.total() == KILLS:
+            break
+        assert_same_run(folder / "run", unbroken / "run")
+    status, output = run(config, folder / "output")
+    assert status == 0, output
+    assert_same_run(folder / "run", unbroken / "run")
+    assert moments.keys() == {"before training", "training", "writing", "at the end"}, moments
+
+
+def moment(folder: Path) -> str:
+    """What a run that was just killed was about."""
+    if any(folder.rglob("*.partial")):
+        return "writing"
+    if (folder / "run" / "pictures").exists():
+        return "at the end"
+    return "training" if (folder / "run" / "last.ckpt").exists() else "before training"
