@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import os
 import resource
 from collections.abc import Sequence
 from functools import partial
 from math import sqrt
-from pathlib import Path
 
 import numpy as np
 import torch
@@ -18,6 +16,7 @@ from ngi.benchmark.batches import Batches
 from ngi.benchmark.figures import Figure, figure
 from ngi.benchmark.remote import remote
 from ngi.benchmark.scenes import Scene
+from ngi.memory import resident_bytes
 
 LEFT_OUT = 0.1
 """The part of the patches in which memory may still grow: caches fill, films get larger."""
@@ -71,9 +70,8 @@ def line(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
 def memory_after_batch(batches: Batches) -> tuple[int, int]:
     """Bytes of main memory that the process holds after another batch, and of its GPU's."""
     batches.render()
-    resident_pages = int(Path("/proc/self/statm").read_text().split()[1])
     free, total = torch.cuda.mem_get_info() if torch.cuda.is_available() else (0, 0)
-    return resident_pages * os.sysconf("SC_PAGE_SIZE"), total - free
+    return resident_bytes() or 0, total - free
 
 
 def peak_memory(_: Batches) -> int:

@@ -12,6 +12,7 @@ from ngi.learn.run_folder import RunFolder
 from ngi.learn.stream import TrainingStream
 from ngi.learn.target_map import TargetMap
 from ngi.learn.tracker import Tracker
+from ngi.learn.usage import usage
 from ngi.provenance import provenance
 
 
@@ -71,6 +72,7 @@ class Recorder:
             **{f"{name}_seconds": value for name, value in self._run_clock.seconds.items()},
             "patches_traced": self._stream.counters.patches_traced,
             "paths_traced": self._stream.counters.paths_traced,
+            **usage(self._folder.path),
             **evaluation.row(),
         }
         self._folder.metrics.append(row)

@@ -1,0 +1,32 @@
+"""What a run takes of its machine, so that a long one can be seen not to grow."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from pathlib import Path
+
+from ngi.memory import resident_bytes
+
+COLUMNS = ("resident_bytes", "open_files", "folder_bytes")
+
+
+def usage(folder: Path) -> dict[str, int | None]:
+    """By `COLUMNS`: main memory and open files of this process, and the size of a folder.
+
+    The first two are None where the system does not say (it does on Linux).
+    """
+    files = Path("/proc/self/fd")
+    values = (
+        resident_bytes(),
+        len(list(files.iterdir())) if files.exists() else None,
+        _folder_bytes(folder),
+    )
+    return dict(zip(COLUMNS, values, strict=True))
+
+
+def _folder_bytes(folder: Path) -> int:
+    total = 0
+    for path in folder.rglob("*"):
+        with suppress(OSError):  # renamed meanwhile, as W&B's files are
+            total += path.stat().st_size if path.is_file() else 0
+    return total

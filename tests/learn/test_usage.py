@@ -1,0 +1,21 @@
+from pathlib import Path
+
+import numpy as np
+
+from ngi.learn.usage import COLUMNS, usage
+
+
+def test_memory_files_and_folder_grow_by_what_is_added(tmp_path: Path) -> None:
+    before = usage(tmp_path)
+    assert tuple(before) == COLUMNS
+    held = np.ones(50 * 2**20, dtype=np.uint8)
+    streams = [(tmp_path / name).open("wb") for name in "abc"]
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "folder" / "file").write_bytes(bytes(1234))
+    grown = {name: (usage(tmp_path)[name] or 0) - (before[name] or 0) for name in COLUMNS}
+    for stream in streams:
+        stream.close()
+    assert 45 * 2**20 < grown["resident_bytes"] < 60 * 2**20
+    assert grown["open_files"] == 3
+    assert grown["folder_bytes"] == 1234
+    del held
