@@ -103,7 +103,7 @@ def test_a_method_differs_where_its_name_says_and_nowhere_else(method: str) -> N
 
 BUDGETS = ("smoke", "small", "paper")
 SWEEPS = [file.stem for file in sorted((root() / "sweeps").glob("*.yaml"))]
-OF_ONE_SIZE = ("demo", "needed", "smoke")
+OF_ONE_SIZE = ("demo", "needed", "smoke", "stability")
 """Sweeps that are no table or figure of the paper."""
 
 

@@ -14,9 +14,7 @@ import torch
 
 from ngi.evaluate.lpips_metric import _convolutions
 from ngi.evaluate.reference import read_reference
-from ngi.evaluate.references import UNREADABLE
 from ngi.learn import CostFile
-from ngi.learn.checkpoint import _read
 from ngi.reuse.archive import _read_segment
 
 SOURCES = Path(__file__).parents[1]
@@ -50,7 +48,6 @@ def as_numpy(path: Path, content: Any) -> None:
 READERS: dict[str, Callable[[Path], object]] = {
     "reference": lambda path: read_reference(path, resolution=8),
     "patches": lambda path: _read_segment(path, 0),
-    "checkpoint": lambda path: _read(path, identity="me"),
     "LPIPS weights": _convolutions,
     "costs": lambda path: CostFile(path).missing([]),
 }
@@ -61,7 +58,7 @@ READERS: dict[str, Callable[[Path], object]] = {
 def test_reading_runs_no_code(tmp_path, read, write) -> None:
     witness, path = tmp_path / "witness", tmp_path / "file"
     write(path, Malicious(witness))
-    with pytest.raises((ValueError, *UNREADABLE)):
+    with pytest.raises(ValueError, match="file"):
         read(path)
     assert not witness.exists()
 

@@ -23,11 +23,11 @@ class Lpips:
     """
 
     def __init__(self, *, weights: Path | str | None) -> None:
-        path = _cached_weights() if weights is None else Path(weights)
+        path = Path(weights) if weights else _cached_weights()
         self.reason: str | None = None
         """Why there is no LPIPS, in one sentence that says how to get it; None where there is."""
         self._network: nn.Module | None = None
-        if weights is None and not path.exists():
+        if not weights and not path.exists():
             self.reason = _how_to_get_weights(path)
         else:
             self._network = _network(_convolutions(path))

@@ -59,9 +59,12 @@ def test_weights_in_the_hub_cache_are_found(tmp_path: Path, monkeypatch) -> None
     assert Lpips(weights=None).available
 
 
-def test_without_weights_it_says_how_to_get_them(tmp_path: Path, monkeypatch) -> None:
+@pytest.mark.parametrize("unset", [None, ""])  # an environment variable that is there, but empty
+def test_without_weights_it_says_how_to_get_them(
+    tmp_path: Path, monkeypatch, unset: str | None
+) -> None:
     monkeypatch.setattr(torch.hub, "get_dir", lambda: str(tmp_path))
-    lpips = Lpips(weights=None)
+    lpips = Lpips(weights=unset)
     assert not lpips.available
     assert lpips.reason is not None
     assert str(tmp_path / "checkpoints" / "alexnet-owt-7be5be79.pth") in lpips.reason
