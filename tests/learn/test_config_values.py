@@ -9,6 +9,7 @@ import re
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -97,13 +98,14 @@ def build(config: DictConfig, folder: Path) -> None:
         stream=stream,
         clock=clock,
         run_clock=clock,
-        folder=None,
+        folder=SimpleNamespace(path=folder),
         tracker=learn.Local(),
         budget=budget,
         recorder=None,
         evaluations=config.evaluation.count,
         checkpoint_seconds=config.run.checkpoint_seconds,
         checkpoint_steps=config.run.checkpoint_steps,
+        interruption=learn.Interruption(of="test"),
     )
     module.configure_optimizers()
     module.rehearse(

@@ -13,6 +13,7 @@ from omegaconf import DictConfig
 from ngi import costs as costs_command
 from ngi.build import run_components
 from ngi.learn import CostFile, TrainingStream
+from ngi.learn.usage import COLUMNS
 from ngi.render import AnalyticRenderer
 from ngi.train import train
 from tests.learn.command_line import SIZE
@@ -58,7 +59,7 @@ def with_costs(config: DictConfig) -> DictConfig:
 
 
 def metrics(folder: Path) -> pd.DataFrame:
-    return pd.read_csv(folder / "run" / "metrics.csv").drop(columns="wall_seconds")
+    return pd.read_csv(folder / "run" / "metrics.csv").drop(columns=["wall_seconds", *COLUMNS])
 
 
 @pytest.fixture(scope="module")
