@@ -56,7 +56,7 @@ def measure(config: DictConfig) -> None:
     _looked_at.add(name)
     keep_freed_memory()
     file = learn.CostFile(Path(config.budget.costs))
-    with closing(instantiate(_in_this_process(config.renderer))) as renderer:
+    with closing(instantiate(in_this_process(config.renderer))) as renderer:
         wanted = run_components(config, renderer=renderer)
         missing = file.missing(wanted)
         if missing:
@@ -138,7 +138,7 @@ def _warn_if_busy() -> None:
         )
 
 
-def _in_this_process(renderer: DictConfig) -> DictConfig:
+def in_this_process(renderer: DictConfig) -> DictConfig:
     serial = {"workers": 0, "cluster": None} if "workers" in renderer else {}
     return OmegaConf.merge(renderer, serial)  # type: ignore[return-value]
 
