@@ -57,5 +57,5 @@ PLANS = {
         evaluations=2,
         frames=40,
     ),
-    "full": Plan(settings=_full(), steps=600, evaluations=20, frames=400),
+    "full": Plan(settings=_full(), steps=500, evaluations=20, frames=400),
 }
