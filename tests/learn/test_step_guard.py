@@ -20,19 +20,13 @@ from ngi.learn.step_guard import LARGEST_NORM, REFUSED_IN_A_ROW
 from ngi.learn.stream import TrainingStream
 from ngi.models import L1Dssim, PixelGenerator
 from ngi.render import AnalyticRenderer, RenderedPatches
+from tests.learn.lightning_warnings import IGNORED
 from tests.learn.small_stream import make
 
 Disturbance = Callable[[int, Tensor], Tensor]
 """(number of the step, from 1; what is computed) -> what is given on."""
 
-pytestmark = [  # as in ngi.learn.lightning_api, whose filters pytest takes away
-    pytest.mark.filterwarnings(f"ignore:{message}")
-    for message in (
-        "Your `IterableDataset` has `__len__` defined",
-        ".*does not have many workers",
-        r"`isinstance\(treespec, LeafSpec\)` is deprecated",
-    )
-]
+pytestmark = IGNORED
 
 LOSS = L1Dssim(l1_weight=1.0, dssim_weight=1.0, window_size=5)
 

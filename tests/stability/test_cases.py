@@ -9,15 +9,9 @@ import pytest
 from ngi.learn import StepGuard
 from ngi.stability.case import Case, Conditions, attempt
 from ngi.stability.groups import GROUPS
+from tests.learn.lightning_warnings import IGNORED
 
-pytestmark = [  # as in ngi.learn.lightning_api, whose filters pytest takes away
-    pytest.mark.filterwarnings(f"ignore:{message}")
-    for message in (
-        "Your `IterableDataset` has `__len__` defined",
-        ".*does not have many workers",
-        r"`isinstance\(treespec, LeafSpec\)` is deprecated",
-    )
-]
+pytestmark = IGNORED
 
 
 SLOW = ("dimensions", "learning rate", "in a pixel")

@@ -1,0 +1,13 @@
+"""Marks for tests that train within pytest, which takes `ngi.learn.lightning_api`'s filters away."""
+
+import pytest
+
+IGNORED = [
+    pytest.mark.filterwarnings(f"ignore:{message}")
+    for message in (
+        "Your `IterableDataset` has `__len__` defined",
+        ".*does not have many workers",
+        r"`isinstance\(treespec, LeafSpec\)` is deprecated",
+    )
+]
+"""The reasons stand there."""
