@@ -1,4 +1,4 @@
-"""Marks for tests that train within pytest, which takes `ngi.learn.lightning_api`'s filters away."""
+"""Marks for tests that train within pytest, which drops `ngi.learn.lightning_api`'s filters."""
 
 import pytest
 
