@@ -160,7 +160,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="python -m analysis.report",
         description="Compares every finished run below FOLDER: results.csv, .md and .tex (mean and "
-        "95 %% interval over seeds), error against run time (.png, .svg), comparison pictures of "
+        "95 % interval over seeds), error against run time (.png, .svg), comparison pictures of "
         "the hard frames, and index.html, which has everything, the verdicts on the paper's claims "
         "and the provenance of the runs in one file. Runs of different protocols, scene files or "
         "references are refused.",
