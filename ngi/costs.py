@@ -108,7 +108,7 @@ def _step_seconds(
         stream = build_stream(config, renderer=stand_in, clock=clock, patches=run.patches)
         module = build_module(config, renderer=stand_in, target=stream.sampler.target, clock=clock)
         timer = StepTimer(clock=clock, scored=scored, seconds=SECONDS)
-        guard = learn.StepGuard(stream=stream, report=Path(folder) / "refused_step.pt")
+        guard = learn.StepGuard(stream=stream, folder=Path(folder))
         feedback = learn.SamplerFeedback(
             stream=stream,
             clock=clock,

@@ -184,6 +184,13 @@ def register() -> None:
     OmegaConf.register_new_resolver("cache_folder", lambda: str(cache_folder()), replace=True)
 
 
+def composed(*overrides: str) -> DictConfig:
+    """The configuration that these words of a command line give."""
+    register()
+    with hydra.initialize_config_dir(str(root() / "conf"), version_base="1.3"):
+        return hydra.compose("train", list(overrides))
+
+
 @hydra.main(version_base="1.3", config_path=str(root() / "conf"), config_name="train")
 def _main(config: DictConfig) -> None:
     try:

@@ -9,7 +9,6 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from hydra import compose, initialize_config_dir
 from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
 
@@ -19,8 +18,7 @@ from ngi.exploration_map.plan import Plan
 from ngi.exploration_map.setting import Method, Setting
 from ngi.exploration_map.test_set import TestSet
 from ngi.render import PocketRenderer
-from ngi.resources import root
-from ngi.train import register
+from ngi.train import composed
 
 PARTS = ("sampler", "reuse", "resolution", "model", "loss", "optimizer", "renderer")
 """Of the program's configuration, that a run of the map is built from."""
@@ -29,10 +27,7 @@ PARTS = ("sampler", "reuse", "resolution", "model", "loss", "optimizer", "render
 @lru_cache
 def configuration(method: Method) -> DictConfig:
     """The program's configuration for a method; what settings change is not in it."""
-    register()
-    overrides = ["experiment=exploration_map", *method.overrides]
-    with initialize_config_dir(str(root() / "conf"), version_base="1.3"):
-        return compose("train", overrides)
+    return composed("experiment=exploration_map", *method.overrides)
 
 
 def plain_configuration(method: Method) -> dict[str, Any]:

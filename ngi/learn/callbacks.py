@@ -139,7 +139,7 @@ def callbacks(
 
     clock: the wall clock; run_clock: the one by which the budget ends, which may be the same
     """
-    guard = StepGuard(stream=stream, report=folder.path / "refused_step.pt")
+    guard = StepGuard(stream=stream, folder=folder.path)
     return [
         guard,
         SamplerFeedback(

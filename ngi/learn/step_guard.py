@@ -37,6 +37,9 @@ OUTLIER = 100.0
 AVERAGED = 100
 """Steps that the average, of the norms' logarithms, goes back."""
 
+REPORT = "refused_step.pt"
+"""File for the weights, Adam's moments, the batch and its losses; `torch.load` reads it."""
+
 REFUSED_IN_A_ROW = 10
 """Steps after which no other batch will help: the run stops."""
 
@@ -53,17 +56,17 @@ class StepGuard(Callback):
     A gradient far larger than the average is scaled down to it, and the step is taken.
 
     Sampler, store and policy learn of such steps as of any other; they know how to deal with
-    losses that are not finite. After `REFUSED_IN_A_ROW` of them the run stops, and `report` holds
+    losses that are not finite. After `REFUSED_IN_A_ROW` of them the run stops, and a report holds
     what it takes to do the last one again.
 
     stream: its counters `steps_refused` and `steps_scaled` count
-    report: file for the weights, Adam's moments, the batch and its losses; `torch.load` reads it
+    folder: where `REPORT` is written
     """
 
-    def __init__(self, *, stream: TrainingStream, report: Path) -> None:
+    def __init__(self, *, stream: TrainingStream, folder: Path) -> None:
         self.gradient_norm = 0.0
         self._stream = stream
-        self._report = report
+        self._report = folder / REPORT
         self._in_a_row = 0
         self._log_norm: float | None = None  # average of the logarithms
 

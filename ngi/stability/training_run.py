@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import torch
-from hydra import compose, initialize_config_dir
 from hydra.utils import instantiate
 from omegaconf import DictConfig
 from torch import Tensor
@@ -18,10 +17,10 @@ from ngi import learn
 from ngi.build import build_module, build_stream
 from ngi.exploration_map.test_set import TestSet
 from ngi.learn.lightning_api import Callback, Trainer
+from ngi.learn.step_guard import REPORT
 from ngi.render import Deferred, PocketRenderer, RenderedPatches
-from ngi.resources import root
 from ngi.stability.case import Conditions
-from ngi.train import register
+from ngi.train import composed
 
 SIZE = (
     "experiment=exploration_map",
@@ -86,7 +85,7 @@ def train(
 ) -> Trained:
     """Trains with a sampler and a precision; what stops the run is part of what is returned."""
     disturbances = disturbances or Disturbances()
-    config = _compose(
+    config = composed(
         *SIZE, f"sampler={conditions.sampler}", f"trainer={conditions.precision}", *overrides
     )
     renderer = _Disturbed(instantiate(config.renderer), disturbances.radiance)
@@ -96,9 +95,6 @@ def train(
         _fit(config, renderer, disturbances, trained, folder=folder, steps=steps)
         trained.report = (folder / REPORT).exists()
     return trained
-
-
-REPORT = "refused_step.pt"
 
 
 def _fit(
@@ -113,7 +109,7 @@ def _fit(
     clock = learn.PhaseClock()
     stream = build_stream(config, renderer=renderer, clock=clock, patches=folder)
     module = build_module(config, renderer=renderer, target=stream.sampler.target, clock=clock)
-    guard = learn.StepGuard(stream=stream, report=folder / REPORT)
+    guard = learn.StepGuard(stream=stream, folder=folder)
     watch = _Watch(stream, guard, disturbances, trained)
     module.loss = watch.disturbed_loss(module.loss)
     trainer = instantiate(config.trainer)(
@@ -127,12 +123,6 @@ def _fit(
     module.to("cpu")
     trained.weights_finite = all(bool(p.isfinite().all()) for p in module.parameters())
     trained.error = TestSet(renderer.inner, frames=FRAMES).errors(module.network)["error_uniform"]
-
-
-def _compose(*overrides: str) -> DictConfig:
-    register()
-    with initialize_config_dir(str(root() / "conf"), version_base="1.3"):
-        return compose("train", list(overrides))
 
 
 class _Disturbed:
@@ -154,13 +144,8 @@ class _Disturbed:
         self._batches += 1
         if self._disturb is None:
             return rendered
-        return RenderedPatches(
-            buffers=rendered.buffers,
-            log_radiance=self._disturb(self._batches, rendered.log_radiance),
-            repaired=0,
-            masked=0,
-            paths=0,
-        )
+        disturbed = self._disturb(self._batches, rendered.log_radiance)
+        return replace(rendered, log_radiance=disturbed)
 
 
 class _Watch(Callback):

@@ -181,5 +181,6 @@ def test_a_signal_that_is_ignored_stays_so() -> None:
     try:
         with Interruption(of="a job in the background"):
             signal.raise_signal(signal.SIGINT)
+        assert signal.getsignal(signal.SIGINT) == signal.SIG_IGN
     finally:
         signal.signal(signal.SIGINT, before)

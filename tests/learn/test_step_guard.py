@@ -80,7 +80,7 @@ def train(
     count = iter(range(1, steps + 1))
     module.network.output_layer.weight.register_hook(lambda g: gradient(next(count), g))
     feedback = Feedback(stream)
-    guard = StepGuard(stream=stream, report=folder / "refused_step.pt")
+    guard = StepGuard(stream=stream, folder=folder)
     trainer = Trainer(
         max_steps=steps,
         accelerator="cpu",
