@@ -18,6 +18,7 @@ QUANTITIES = {
     "open_files": ("open files", "", 1.0),
     "folder_bytes": ("folder", "MiB", 2**-20),
     "steps_per_second": ("steps per second", "", 1.0),
+    "steps_per_cpu_second": ("steps per second of processor time", "", 1.0),
 }
 """Column: what it is called, its unit, and the factor to it."""
 
@@ -31,8 +32,9 @@ def endurance(folder: Path) -> pd.DataFrame:
     """A row per quantity: its means over the first and the last quarter, and its trend.
 
     folder: of a run whose metrics.csv has at least a dozen rows; steps per second are those between
-        two rows. The trend is a least-squares line over wall time without evaluations, after the
-        first tenth of it; its interval takes the rows as independent.
+        two rows, those per second of processor time, which other programs hardly change, include an
+        evaluation in each. The trend is a least-squares line over wall time without evaluations,
+        after the first tenth of it; its interval takes the rows as independent.
     Raises ValueError for a run that is too short to tell.
     """
     history = pd.read_csv(folder / "metrics.csv")
@@ -41,13 +43,17 @@ def endurance(folder: Path) -> pd.DataFrame:
             f"{folder / 'metrics.csv'}: {len(history)} evaluations are too few to see a trend; "
             "train with evaluation.count=48, say"
         )
-    history["steps_per_second"] = history["step"].diff() / history["wall_seconds"].diff()
+    steps = history["step"].diff()
+    history["steps_per_second"] = steps / history["wall_seconds"].diff()
+    processor = history["cpu_seconds"].diff()
+    history["steps_per_cpu_second"] = steps / processor.where(processor > 0)  # went on elsewhere
     hours = history["wall_seconds"] / 3600
     settled = history[hours > SETTLED * hours.iloc[-1]]
     rows = []
     for column, (name, unit, factor) in QUANTITIES.items():
-        values = settled[column].to_numpy(dtype=float) * factor
-        slope, half_width = _trend(hours[settled.index].to_numpy(), values)
+        known = settled[column].dropna().astype(float) * factor
+        values = known.to_numpy()
+        slope, half_width = _trend(hours[known.index].to_numpy(), values)
         quarter = max(1, len(values) // 4)
         label = f"{name}, {unit}" if unit else name
         rows.append((label, values[:quarter].mean(), values[-quarter:].mean(), slope, half_width))

@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
+import time
 from contextlib import suppress
 from pathlib import Path
 
 from ngi.memory import resident_bytes
 
-COLUMNS = ("resident_bytes", "open_files", "folder_bytes")
+COLUMNS = ("resident_bytes", "open_files", "folder_bytes", "cpu_seconds")
 
 
-def usage(folder: Path) -> dict[str, int | None]:
-    """By `COLUMNS`: main memory and open files of this process, and the size of a folder.
+def usage(folder: Path) -> dict[str, float | None]:
+    """By `COLUMNS`: main memory and open files of this process, size of a folder, processor time.
 
-    The first two are None where the system does not say (it does on Linux).
+    The first two are None where the system does not say (it does on Linux). Processor time is this
+    process's since it began, of all its threads.
     """
     files = Path("/proc/self/fd")
     values = (
         resident_bytes(),
         len(list(files.iterdir())) if files.exists() else None,
         _folder_bytes(folder),
+        time.process_time(),
     )
     return dict(zip(COLUMNS, values, strict=True))
 

@@ -19,6 +19,8 @@ def write(folder: Path, *, growth: float = 0.0, rows: int = 49) -> Path:
             "resident_bytes": (100 + growth * HOURS + generator.normal(0, 0.5, 49)) * 2**20,
             "open_files": 20,
             "folder_bytes": (HOURS * 2**20).astype(int),
+            "cpu_seconds": HOURS * 3600 * 0.5
+            - (HOURS > 2.5) * 3000,  # went on after an interruption
         }
     )
     table.head(rows).to_csv(folder / "metrics.csv", index=False)
@@ -39,6 +41,9 @@ def test_growth_is_told_from_noise(tmp_path: Path) -> None:
 def test_speed_files_and_disk(tmp_path: Path) -> None:
     table = endurance(write(tmp_path)).set_index("quantity")
     assert table.loc["steps per second", "first quarter"] == pytest.approx(5, rel=1e-3)
+    per_processor_second = table.loc["steps per second of processor time"]
+    assert per_processor_second["first quarter"] == pytest.approx(10, rel=1e-3)
+    assert per_processor_second["change per hour"] == pytest.approx(0, abs=0.01)
     assert table.loc["folder, MiB", "change per hour"] == pytest.approx(1, rel=1e-3)
     assert table.loc["open files", ["first quarter", "change per hour"]].tolist() == [20, 0]
 

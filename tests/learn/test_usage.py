@@ -19,4 +19,5 @@ def test_memory_files_and_folder_grow_by_what_is_added(tmp_path: Path) -> None:
     assert 45 * 2**20 < grown["resident_bytes"] < 60 * 2**20
     assert grown["open_files"] == 3
     assert grown["folder_bytes"] == 1234
+    assert 0 < grown["cpu_seconds"] < 10
     held.close()
