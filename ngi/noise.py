@@ -54,7 +54,7 @@ def measure(config: DictConfig) -> list[tuple[str, float, float, float]]:
     path = folder / "last.ckpt"
     if not path.exists():
         raise ValueError(f"{path} is not there; name a run as its own command line does")
-    checkpoint = torch.load(path, map_location="cpu", weights_only=True)
+    checkpoint = learn.read_checkpoint(path)
     states, resolution = _states(config, checkpoint["ExplorationDataModule"])
     losses: dict[str, list[Tensor]] = {name: [] for name in states}
     for factor in (1, MORE_SAMPLES):

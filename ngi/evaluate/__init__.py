@@ -3,6 +3,7 @@
 from ngi.evaluate.evaluation import Evaluation, FrameMetrics
 from ngi.evaluate.evaluator import Evaluator
 from ngi.evaluate.frames import Frame, evaluation_frames
+from ngi.evaluate.image_metrics import ImageMetrics, image_metrics
 from ngi.evaluate.lpips_metric import Lpips
 from ngi.evaluate.metrics import dssim, mae, mape, non_finite_pixels, tone_map
 from ngi.evaluate.pictures import error_picture, write_pictures
@@ -18,12 +19,14 @@ __all__ = [
     "Evaluator",
     "Frame",
     "FrameMetrics",
+    "ImageMetrics",
     "Lpips",
     "Reference",
     "ReferenceCache",
     "dssim",
     "error_picture",
     "evaluation_frames",
+    "image_metrics",
     "mae",
     "mape",
     "non_finite_pixels",

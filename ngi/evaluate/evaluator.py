@@ -13,8 +13,9 @@ from tqdm import tqdm
 
 from ngi.evaluate.evaluation import Evaluation, FrameMetrics
 from ngi.evaluate.frames import Frame, evaluation_frames
+from ngi.evaluate.image_metrics import image_metrics
 from ngi.evaluate.lpips_metric import Lpips
-from ngi.evaluate.metrics import dssim, mae, mape, non_finite_pixels, tone_map
+from ngi.evaluate.metrics import non_finite_pixels
 from ngi.evaluate.protocol import EvaluationProtocol
 from ngi.evaluate.reference import Reference
 from ngi.evaluate.references import ReferenceCache
@@ -132,17 +133,11 @@ class Evaluator:
 
     def _measure(self, frame: Frame, prediction: Tensor, reference: Tensor) -> FrameMetrics:
         """prediction, reference: [H, W, 3] linear radiance."""
-        protocol = self.protocol
-        picture = tone_map(prediction, protocol.exposure)
-        wanted = tone_map(reference, protocol.exposure)
         return FrameMetrics(
             set=frame.set,
             index=frame.index,
-            mape=mape(prediction, reference, protocol.epsilon),
-            dssim=dssim(picture, wanted, window=protocol.ssim_window, sigma=protocol.ssim_sigma),
-            mae=mae(prediction, reference),
-            lpips=self._lpips(picture, wanted) if self._lpips.available else None,
             non_finite=non_finite_pixels(prediction),
+            **image_metrics(prediction, reference, protocol=self.protocol, lpips=self._lpips),
         )
 
 

@@ -73,10 +73,14 @@ def error_picture(prediction: Tensor, reference: Tensor, epsilon: float) -> np.n
 
 def srgb_picture(radiance: Tensor, exposure: float) -> Image.Image:
     """Linear radiance [H, W, 3] as a picture; non-finite pixels in cyan."""
-    picture = tone_map(radiance, exposure).cpu()
-    eight_bit = (picture.nan_to_num() * 255).round().to(torch.uint8).numpy()
-    eight_bit[picture.isnan().any(dim=-1).numpy()] = NON_FINITE
-    return Image.fromarray(eight_bit)
+    return Image.fromarray(eight_bit(tone_map(radiance, exposure)))
+
+
+def eight_bit(picture: Tensor) -> np.ndarray:
+    """[H, W, 3] uint8 of values in [0, 1]; NaN in cyan."""
+    levels = (picture.cpu().nan_to_num() * 255).round().to(torch.uint8).numpy()
+    levels[picture.isnan().any(dim=-1).cpu().numpy()] = NON_FINITE
+    return levels
 
 
 def _triptych(pictures: list[Image.Image], labels: tuple[str, ...]) -> Image.Image:

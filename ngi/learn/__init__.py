@@ -3,7 +3,7 @@
 from ngi.learn.batch import Batch, Counters, Feedback
 from ngi.learn.budget import Budget
 from ngi.learn.callbacks import SamplerFeedback, callbacks
-from ngi.learn.checkpoint import AtomicCheckpointIO, prepare_resume
+from ngi.learn.checkpoint import AtomicCheckpointIO, prepare_resume, read_checkpoint
 from ngi.learn.clock import PhaseClock, RunClock
 from ngi.learn.costs import Component, CostFile, Costs, components
 from ngi.learn.datamodule import ExplorationDataModule
@@ -55,5 +55,6 @@ __all__ = [
     "components",
     "gradient_norm",
     "prepare_resume",
+    "read_checkpoint",
     "seeded",
 ]

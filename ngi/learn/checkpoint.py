@@ -95,15 +95,26 @@ def _newest_usable(folder: RunFolder) -> dict[str, Any] | None:
     return None
 
 
-def _read(path: Path, folder: RunFolder) -> dict[str, Any]:
+def read_checkpoint(path: Path) -> dict[str, Any]:
+    """A checkpoint file's content, on the CPU; executes no code of it.
+
+    Raises `DamagedError` where it is not what was written.
+    """
     content = memoryview(path.read_bytes())
     content, checksum = content[:-CHECKSUM_BYTES], content[-CHECKSUM_BYTES:]
     if hashlib.sha256(content).digest() != checksum:
         raise DamagedError(f"{path} is damaged (its checksum is not that of its content)")
     try:
-        checkpoint = torch.load(io.BytesIO(content), map_location="cpu", weights_only=True)
+        checkpoint: dict[str, Any] = torch.load(
+            io.BytesIO(content), map_location="cpu", weights_only=True
+        )
     except Exception as error:  # torch.load raises nearly anything; its advice is to execute code
         raise DamagedError(f"{path} can not be read ({type(error).__name__})") from error
+    return checkpoint
+
+
+def _read(path: Path, folder: RunFolder) -> dict[str, Any]:
+    checkpoint = read_checkpoint(path)
     if checkpoint[IDENTITY] != folder.identity:
         raise ValueError(
             f"{path} belongs to run {checkpoint[IDENTITY]}, this is run {folder.identity} (another "

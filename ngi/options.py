@@ -1,0 +1,62 @@
+"""`key=value` on the command lines of small programs, as `ngi.train` takes it, checked by type."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import MISSING, Field, field, fields
+from typing import Any, NoReturn, TypeVar, cast
+
+from omegaconf import OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+Options = TypeVar("Options")
+
+
+def option(text: str, default: Any = MISSING) -> Any:
+    """A field of a dataclass of options. text: for --help; without a default it must be given."""
+    return field(default=default, metadata={"help": text})
+
+
+def read_options(kind: type[Options], program: str, arguments: Sequence[str]) -> Options:
+    """A `kind`, whose fields are made by `option`, from `key=value` arguments in YAML's notation.
+
+    Ends the program with status 0 where help is asked for, its text being `kind`'s docstring and
+    its fields', and with status 2 and a message for an unknown or missing key or a wrong value.
+    """
+    if {"-h", "--help"} & set(arguments):
+        print(_help(kind, program))
+        sys.exit(0)
+    given = [argument.partition("=") for argument in arguments]
+    known = {entry.name for entry in fields(cast("Any", kind))}
+    for key, equals, _ in given:
+        if key not in known or not equals:
+            _refuse(program, f"'{key}' is no option; there are {', '.join(sorted(known))}")
+    required = {e.name for e in fields(cast("Any", kind)) if e.default is MISSING}
+    if missing := sorted(required - {key for key, _, _ in given}):
+        _refuse(program, f"give {missing[0]}=…")
+    try:
+        values = OmegaConf.merge(
+            OmegaConf.structured(kind), OmegaConf.from_dotlist(list(arguments))
+        )
+        return cast("Options", OmegaConf.to_object(values))
+    except OmegaConfBaseException as error:
+        _refuse(program, f"{error.full_key}: {str(error).splitlines()[0]}")
+
+
+def _refuse(program: str, problem: str) -> NoReturn:
+    print(f"{program}: {problem}; --help says more", file=sys.stderr)
+    sys.exit(2)
+
+
+def _help(kind: type, program: str) -> str:
+    rows = [(_shown(entry), entry.metadata["help"]) for entry in fields(kind)]
+    width = 2 + max(len(name) for name, _ in rows)
+    lines = [f"  {name:{width}}{text}" for name, text in rows]
+    return "\n".join([f"python -m {program}\n", (kind.__doc__ or "").strip(), "", *lines])
+
+
+def _shown(entry: Field[Any]) -> str:
+    if entry.default is MISSING:
+        return f"{entry.name}=…"
+    return f"{entry.name}={'' if entry.default is None else entry.default}"

@@ -1,0 +1,119 @@
+"""One configuration of a scene as a trained network shows it: `python -m ngi.render --help`."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+from ngi.options import option, read_options
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+    from ngi.render import Renderer
+
+SUFFIXES = (".png", ".exr")
+
+
+@dataclass
+class PictureOptions:
+    """Renders one configuration of a scene with a trained network.
+
+    python -m ngi.render run=outputs/demo/sphere-caustic/method=uniform/seed=0 hard_frame=3
+    python -m ngi.render run=FOLDER v=[0.5,0.2,0.9] resolution=512 out=picture.exr
+    python -m ngi.render run=FOLDER reference=1024
+    """
+
+    run: str = option("a run's folder, finished or not")
+    out: str = option("file to write: .png (sRGB) or .exr (linear radiance)", "picture.png")
+    v: list[float] | None = option("configuration, D numbers from 0 to 1", None)
+    hard_frame: int = option("where there is no v: which of the scene's hard frames", 0)
+    resolution: int = option("pixels a side", 256)
+    exposure: float = option("stops, of PNG files", 0.0)
+    reference: int = option("samples per pixel of a path-traced picture beside it, with errors", 0)
+    scene: str | None = option("of a run of the authors' files: their folder", None)
+
+
+def write_picture(options: PictureOptions) -> None:
+    """Writes the picture, and where a reference is asked for that, the error map and the metrics.
+
+    Raises ValueError or OSError, naming key and value, before anything is rendered.
+    """
+    from PIL import Image
+
+    from ngi.evaluate import Lpips, error_picture, image_metrics
+    from ngi.view.trained_run import TrainedRun
+
+    out = Path(options.out)
+    if out.suffix not in SUFFIXES:
+        raise ValueError(f"out: '{out}' ends with neither of {' and '.join(SUFFIXES)}")
+    if not out.parent.is_dir():
+        raise ValueError(f"out: there is no folder {out.parent}")
+    if not options.resolution >= 1 or not options.reference >= 0:
+        raise ValueError("resolution has to be at least 1, reference at least 0")
+    run = TrainedRun.open(
+        Path(options.run), scene_path=None if options.scene is None else Path(options.scene)
+    )
+    with closing(run.renderer):
+        v = _scene_vector(options, run.renderer)
+        begin = perf_counter()
+        radiance = run.radiance(v, resolution=options.resolution)
+        print(f"step {run.step}, {1e3 * (perf_counter() - begin):.0f} ms; {out}")
+        _write(out, radiance, exposure=options.exposure)
+        if options.reference == 0:
+            return
+        reference = run.renderer.render_image(
+            v, resolution=options.resolution, samples_per_pixel=options.reference, seed=0
+        ).cpu()
+    _write(_beside(out, "reference"), reference, exposure=options.exposure)
+    error = Image.fromarray(error_picture(radiance, reference, run.protocol.epsilon))
+    error.save(_beside(out, "error").with_suffix(".png"))
+    lpips = Lpips(weights=os.environ.get("NGI_LPIPS_WEIGHTS"))
+    measured = image_metrics(radiance, reference, protocol=run.protocol, lpips=lpips)
+    print(", ".join(f"{name} {value:.4g}" for name, value in measured.items() if value is not None))
+
+
+def _scene_vector(options: PictureOptions, renderer: Renderer) -> Tensor:
+    import torch
+
+    if options.v is None:
+        frames = renderer.hard_frames()
+        if not 0 <= options.hard_frame < len(frames):
+            raise ValueError(f"hard_frame: {options.hard_frame}; there are 0 to {len(frames) - 1}")
+        return frames[options.hard_frame]
+    v = torch.tensor(options.v)
+    if len(v) != renderer.dimensions or not ((v >= 0) & (v <= 1)).all():
+        raise ValueError(f"v: {options.v}; expected {renderer.dimensions} numbers from 0 to 1")
+    return v
+
+
+def _write(path: Path, radiance: Tensor, *, exposure: float) -> None:
+    from ngi.evaluate.pictures import srgb_picture
+    from ngi.render.exr import write_exr
+
+    if path.suffix == ".exr":
+        write_exr(path, radiance)
+    else:
+        srgb_picture(radiance, exposure).save(path)
+
+
+def _beside(path: Path, what: str) -> Path:
+    return path.with_name(f"{path.stem}_{what}{path.suffix}")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point of `python -m ngi.render`; 2 where it could not be done."""
+    given = sys.argv[1:] if arguments is None else arguments
+    options = read_options(PictureOptions, "ngi.render", given)
+    try:
+        write_picture(options)
+    except (ValueError, OSError, RuntimeError) as error:
+        print(error, file=sys.stderr)
+        return 2
+    return 0

@@ -1,0 +1,133 @@
+"""`python -m ngi.render` on runs of closed formulas, as a user starts it."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from PIL import Image
+
+from ngi.render.exr import write_exr
+from tests.learn.command_line import environment, run
+
+RUN = "run.folder=run"
+
+
+def render(folder: Path, *options: str) -> tuple[int, str]:
+    done = subprocess.run(
+        [sys.executable, "-m", "ngi.render", "run=run", *options],
+        capture_output=True,
+        text=True,
+        cwd=folder,
+        env=environment(folder),
+        timeout=300,
+    )
+    return done.returncode, done.stdout + done.stderr
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("trained")
+    status, output = run(folder, RUN)
+    assert status == 0, output
+    return folder
+
+
+def test_the_picture_is_the_one_that_training_wrote(trained: Path) -> None:
+    status, output = render(trained, "hard_frame=3", "resolution=48", "out=three.png")
+    assert status == 0, output
+    assert "step 12" in output
+    expected = Image.open(trained / "run" / "pictures" / "hard_03_prediction.png")
+    np.testing.assert_array_equal(np.asarray(Image.open(trained / "three.png")), expected)
+    assert not list(trained.glob("*.log"))
+
+
+def test_a_reference_beside_it_and_the_metrics(trained: Path) -> None:
+    status, output = render(trained, "reference=4", "resolution=48", "out=zero.png")
+    assert status == 0, output
+    written = json.loads((trained / "run" / "result.json").read_text())["frames"][0]
+    assert f"mape {written['mape']:.4g}" in output  # closed formulas have no noise
+    for kind in ("reference", "error"):
+        expected = Image.open(trained / "run" / "pictures" / f"hard_00_{kind}.png")
+        np.testing.assert_array_equal(
+            np.asarray(Image.open(trained / f"zero_{kind}.png")), expected
+        )
+
+
+def test_v_may_be_given(trained: Path) -> None:
+    for name, v in (("a", "[0,0.5,1]"), ("b", "[0,0.5,0.9]")):
+        status, output = render(trained, f"v={v}", "resolution=32", f"out={name}.exr")
+        assert status == 0, output
+    assert (trained / "a.exr").read_bytes() != (trained / "b.exr").read_bytes()
+
+
+def test_exr_files_hold_linear_radiance(tmp_path: Path) -> None:
+    from ngi.backend import mi
+
+    radiance = torch.rand(5, 7, 3, generator=torch.Generator().manual_seed(0)) * 100 - 1
+    write_exr(tmp_path / "a.exr", radiance)
+    np.testing.assert_array_equal(np.array(mi.Bitmap(str(tmp_path / "a.exr"))), radiance)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("run=elsewhere",), "elsewhere/settings.json: no such file"),
+        (("v=[0.5,2,0]",), "expected 3 numbers from 0 to 1"),
+        (("v=[0.5]",), "expected 3 numbers from 0 to 1"),
+        (("hard_frame=10",), "there are 0 to 9"),
+        (("out=picture.jpg",), ".png"),
+        (("out=nowhere/picture.png",), "no folder nowhere"),
+        (("resolution=0",), "at least 1"),
+        (("resolution=many",), "resolution: "),
+        (("colour=red",), "'colour' is no option"),
+    ],
+)
+def test_mistakes_are_named(trained: Path, options: tuple[str, ...], message: str) -> None:
+    status, output = render(trained, *options)
+    assert status == 2
+    assert message in output
+    assert "Traceback" not in output
+
+
+def test_a_damaged_checkpoint_gives_way_to_the_one_before(tmp_path: Path) -> None:
+    status, output = run(tmp_path, RUN, "run.checkpoint_steps=4")
+    assert status == 0, output
+    newest = tmp_path / "run" / "last.ckpt"
+    content = bytearray(newest.read_bytes())
+    content[len(content) // 2] ^= 1
+    newest.write_bytes(content)
+    status, output = render(tmp_path)
+    assert status == 0, output
+    assert "step 8" in output
+    (tmp_path / "run" / "previous.ckpt").unlink()
+    status, output = render(tmp_path)
+    assert status == 2
+    assert "last.ckpt is damaged" in output
+    newest.unlink()
+    status, output = render(tmp_path)
+    assert status == 2
+    assert "no checkpoint yet" in output
+
+
+def test_a_scene_that_changed_or_is_unknown_is_refused(trained: Path, tmp_path: Path) -> None:
+    settings = json.loads((trained / "run" / "settings.json").read_text())
+    for scene, renderer, message in (
+        ({"name": "analytic", "hash": "0"}, settings["renderer"], "has changed since"),
+        (
+            {"name": "my-lamp", "hash": "0"},
+            {"_target_": "ngi.render.workers.mitsuba_renderer"},
+            "scene 'my-lamp' is not known here",
+        ),
+    ):
+        folder = tmp_path / scene["name"]
+        (folder / "run").mkdir(parents=True)
+        (folder / "run" / "last.ckpt").write_bytes((trained / "run" / "last.ckpt").read_bytes())
+        changed = {**settings, "scene": scene, "renderer": renderer}
+        (folder / "run" / "settings.json").write_text(json.dumps(changed))
+        status, output = render(folder)
+        assert status == 2
+        assert message in output
