@@ -26,7 +26,7 @@ class Curve:
     n: int
 
 
-def error_curve(runs: Sequence[Run], key: str) -> Curve | None:
+def error_curve(runs: Sequence[Run], key: str, *, signed: bool = False) -> Curve | None:
     """The column `key` of metrics.csv over the runs of one scene and method.
 
     The seeds are evaluated at slightly different times: the curve has the first run's, as far as
@@ -35,6 +35,8 @@ def error_curve(runs: Sequence[Run], key: str) -> Curve | None:
 
     The interval is Student's over the seeds, of the mean's logarithm (to first order its standard
     error is the mean's relative one), so that it stays above 0 with three seeds too.
+
+    signed: for values that may be negative; the interval is that of the mean itself then
     """
     series = []
     for run in runs:
@@ -52,10 +54,12 @@ def error_curve(runs: Sequence[Run], key: str) -> Curve | None:
     times = np.unique(series[0][:, 0].clip(start, end))
     values = np.stack([np.interp(times, points[:, 0], points[:, 1]) for points in series])
     mean = values.mean(axis=0)
-    factor = np.exp([_relative_half_width(column) for column in values.T])
-    return Curve(times, mean, mean / factor, mean * factor, len(runs))
+    half_width = np.array([_half_width(column) for column in values.T])
+    if signed:
+        return Curve(times, mean, mean - half_width, mean + half_width, len(runs))
+    relative = np.divide(half_width, mean, out=np.zeros_like(mean), where=mean != 0)
+    return Curve(times, mean, mean / np.exp(relative), mean * np.exp(relative), len(runs))
 
 
-def _relative_half_width(values: np.ndarray) -> float:
-    mean = estimate(values.tolist())
-    return 0.0 if mean.half_width is None or mean.mean == 0 else mean.half_width / mean.mean
+def _half_width(values: np.ndarray) -> float:
+    return estimate(values.tolist()).half_width or 0.0

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from analysis.claims import SALONS
 from analysis.curves import error_curve
 from analysis.pairs import pair_runs
-from analysis.plots import STYLE, draw_band, new_figure, save_figure
+from analysis.plots import STYLE, add_legend, draw_band, new_figure, save_figure
 from analysis.runs import METRICS, Run
 from analysis.tables import TITLES
 
@@ -43,8 +43,7 @@ def dimensions_figure(runs: Sequence[Run], metrics: Sequence[str]) -> Figure:
         _draw(axes, runs, f"hard_{metric}")
         axes.set_title(f"{TITLES[metric]}: difference", fontsize=9, loc="left")
         axes.set_xlabel("run time in seconds")
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False)
+    add_legend(figure)
     return figure
 
 
@@ -58,7 +57,8 @@ def _draw(axes: Axes, runs: Sequence[Run], key: str) -> None:
     colours = matplotlib.colormaps["viridis"](np.linspace(0, 0.85, len(salons)))
     for salon, colour in zip(salons, colours, strict=True):
         pairs = pair_runs(runs, salon, BETTER, WORSE)
-        curve = error_curve([_difference(pair.better, pair.worse, key) for pair in pairs], key)
+        differences = [_difference(pair.better, pair.worse, key) for pair in pairs]
+        curve = error_curve(differences, key, signed=True)
         if curve is not None:
             draw_band(axes, curve, label=salon, color=matplotlib.colors.to_hex(colour))
     axes.axhline(0, color="#666666", linewidth=0.8)

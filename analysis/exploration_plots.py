@@ -13,7 +13,7 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from analysis.chain_trace import read_chain_trace
 from analysis.methods import methods_in_order, title
-from analysis.plots import LINE_WIDTH, STYLE, new_figure, save_figure
+from analysis.plots import LINE_WIDTH, STYLE, add_legend, new_figure, save_figure
 from analysis.runs import Run
 from analysis.step_log import mean_over_time, read_steps
 from analysis.target_map import Window, histogram_distances, windows
@@ -106,7 +106,7 @@ def _over_time(runs: Sequence[Run], styles: Styles) -> Figure:
     for axis in (panels[-1].xaxis, panels[-1].yaxis):
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axis.set_minor_formatter(NullFormatter())
-    figure.legend(loc="outside lower center", ncols=4, frameon=False)
+    add_legend(figure)
     figure.suptitle(f"{runs[0].scene}: what the chains did (mean over seeds)", fontsize=10)
     return figure
 
@@ -200,9 +200,9 @@ def _distances(runs: Sequence[Run], styles: Styles) -> Figure:
     grey = {"color": "#666666"}
     rows[0, 0].plot([], [], "--", label="as many uniform states", **grey)
     rows[0, 0].plot([], [], ":", label="as many independent states of the target", **grey)
-    figure.legend(loc="outside lower center", ncols=3, frameon=False)
+    add_legend(figure)
     figure.suptitle(
-        f"{runs[0].scene}: Jensen-Shannon distance of the chains' histogram from their target",
+        f"{runs[0].scene}: how closely the chains follow their target (Jensen-Shannon distance)",
         fontsize=10,
     )
     return figure

@@ -32,6 +32,9 @@ LOG_RATIO = 4.0
 LINE_WIDTH = 1.4
 """Of a method's curve, in points."""
 
+LEGEND_KEY, LEGEND_CHARACTER = 0.55, 0.078
+"""Inches that a legend's entry takes: its line, and a character of its label, at the most."""
+
 STYLE: dict[Any, Any] = {
     "font.size": 9,
     "axes.spines.top": False,
@@ -130,15 +133,22 @@ def error_figure(
     for axes in axes_grid[-1]:
         axes.set_xlabel("run time in seconds")
     if legend:
-        handles = {
-            label: handle
-            for axes in axes_grid.flat
-            for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
-        }
-        figure.legend(
-            handles.values(), handles.keys(), loc="outside lower center", ncols=4, frameon=False
-        )
+        add_legend(figure)
     return figure
+
+
+def add_legend(figure: Figure) -> None:
+    """Of all panels, each label once, below them in as many columns as find room."""
+    handles = {
+        label: handle
+        for axes in figure.axes
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
+    }
+    widest = LEGEND_KEY + LEGEND_CHARACTER * max(map(len, handles), default=0)
+    columns = max(1, min(len(handles), int(figure.get_figwidth() / widest)))
+    figure.legend(
+        handles.values(), handles.keys(), loc="outside lower center", ncols=columns, frameon=False
+    )
 
 
 def _draw(axes: Axes, panel: ErrorPanel, styles: Mapping[str, dict[str, Any]]) -> None:

@@ -23,7 +23,7 @@ from analysis.exploration_map.runs import (
     scoring_cost,
 )
 from analysis.exploration_map.speedup import Comparison
-from analysis.plots import COLOURS, STYLE, new_figure, save_figure
+from analysis.plots import COLOURS, STYLE, add_legend, new_figure, save_figure
 
 COLUMNS = 4
 
@@ -69,7 +69,7 @@ def _knobs(speedups: pd.DataFrame) -> Figure:
         axes.set_title(f"{REUSE[reuse]}", fontsize=8, loc="left")
     for axes in panels[::COLUMNS]:
         axes.set_ylabel("run time, uniform / exploration")
-    _legend(figure, panels[0])
+    add_legend(figure)
     return figure
 
 
@@ -110,7 +110,7 @@ def _errors(table: pd.DataFrame, error: str) -> Figure:
             axes.set_title(f"volume {volume:g}, {REUSE[reuse]}", fontsize=8, loc="left")
         panel_row[0].set_ylabel(ERRORS[error])
     figure.supxlabel("run time in training steps, mean over seeds", fontsize=9)
-    _legend(figure, panels[0, 0])
+    add_legend(figure)
     return figure
 
 
@@ -126,8 +126,3 @@ def _error_panel(axes: Axes, rows: pd.DataFrame, reuse: bool, error: str) -> Non
             **style,
         )
     axes.set_ylim(bottom=0)
-
-
-def _legend(figure: Figure, axes: Axes) -> None:
-    handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)

@@ -41,3 +41,11 @@ def test_one_seed_and_a_mean_of_zero_have_no_band() -> None:
         assert curve is not None
         assert np.array_equal(curve.low, curve.mean)
         assert np.array_equal(curve.high, curve.mean)
+
+
+def test_band_of_differences_is_the_interval_of_the_mean_on_both_sides_of_zero() -> None:
+    values = [-0.02, 0.05, -0.01]
+    curve = error_curve([run(value) for value in values], "hard_mape", signed=True)
+    assert curve is not None
+    low, high = stats.t.interval(0.95, 2, loc=np.mean(values), scale=stats.sem(values))
+    assert (curve.low[0], curve.high[0]) == (pytest.approx(low), pytest.approx(high))
