@@ -60,7 +60,10 @@ CLAIMS = (
         "and shadows and less error than uniform sampling with the same sample reuse, which ends "
         "at a low quality that more training does not improve.",
         source="Sec. 7.2.1; Tab. 3; Fig. 11, 13",
-        comparisons=(Comparison(SEVEN_SCENES, "active_exploration", "uniform"),),
+        comparisons=(
+            Comparison(SEVEN_SCENES, "active_exploration", "uniform"),
+            Comparison(SEVEN_SCENES, "constant_resolution", "uniform", decides=False),
+        ),
     ),
     Claim(
         id="preconditioning",
