@@ -22,6 +22,7 @@ demo: setup ## train exploration and uniform sampling, compare them: 15 minutes
 	$(BIN)/python -m analysis.report outputs/demo && exit $$status
 
 test: setup lint smoke ## linter, type checker, all tests, smoke run on real renders
+	@sh tools/browser.sh
 	@OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n auto --maxprocesses 4 --dist loadfile
 
 lint: setup

@@ -1,0 +1,80 @@
+"""Shows a trained network in the browser: `python -m ngi.view --help`."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from contextlib import closing, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from ngi.options import option, read_options
+
+POLL = 0.5
+"""Seconds to wait for something to do, after which Ctrl-C is looked at."""
+
+
+@dataclass
+class ViewOptions:
+    """Shows a trained network in the browser, with a slider for every variable of the scene.
+
+    python -m ngi.view run=outputs/demo/sphere-caustic/method=uniform/seed=0
+
+    Over SSH: ssh -L 8080:127.0.0.1:8080 MACHINE, then open http://127.0.0.1:8080 here.
+    """
+
+    run: str = option("a run's folder, finished or not")
+    resolution: int = option("pixels a side at first", 256)
+    port: int = option("of the page", 8080)
+    host: str = option(
+        "0.0.0.0 lets other machines in, everybody who can reach this one", "127.0.0.1"
+    )
+    scene: str | None = option("of a run of the authors' files: their folder", None)
+
+
+def view(options: ViewOptions) -> None:
+    """Serves the page until Ctrl-C."""
+    from ngi.view.page import ErrorPage, Page
+    from ngi.view.studio import Studio
+    from ngi.view.subject import subject
+    from ngi.view.trained_run import TrainedRun
+
+    scene = None if options.scene is None else Path(options.scene)
+    try:
+        run = TrainedRun.open(Path(options.run), scene_path=scene)
+    except (ValueError, OSError, RuntimeError) as error:
+        print(error, file=sys.stderr)
+        with closing(ErrorPage(str(error), host=options.host, port=options.port)) as page:
+            print(f"{page.address} says so too; end with Ctrl-C")
+            page.wait()
+        return
+    studio = Studio(renderer=run.renderer, predict=run.predict)
+    shown = subject(
+        name=f"{run.scene_name}, step {run.step:,}",
+        folder=run.folder,
+        description=run.description,
+        renderer=run.renderer,
+        protocol=run.protocol,
+    )
+    with (
+        closing(run.renderer),
+        closing(
+            Page(studio, shown, resolution=options.resolution, host=options.host, port=options.port)
+        ) as page,
+    ):
+        print(f"{page.address}; end with Ctrl-C", flush=True)
+        while True:
+            studio.work(wait=POLL)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point of `python -m ngi.view`."""
+    given = sys.argv[1:] if arguments is None else arguments
+    options = read_options(ViewOptions, "ngi.view", given)
+    with suppress(KeyboardInterrupt):
+        view(options)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

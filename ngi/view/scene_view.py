@@ -1,0 +1,111 @@
+"""What can be seen of one configuration: the network's picture, the buffers, a path-traced one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from time import perf_counter
+
+import torch
+from torch import Tensor
+
+from ngi.render import Renderer
+
+Predict = Callable[[Tensor, Tensor], Tensor]
+"""(buffers [H, W, C], v [D]) -> log1p of linear radiance [H, W, 3]."""
+
+PASS_SAMPLES = 8
+"""Samples per pixel of one pass of the path-traced picture."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where to look: v, and pixels a side."""
+
+    v: tuple[float, ...]
+    resolution: int
+
+    def tensor(self) -> Tensor:
+        """[D]."""
+        return torch.tensor(self.v)
+
+
+@dataclass
+class SceneView:
+    """One configuration at one resolution, each part computed when it is first asked for.
+
+    seconds: by part, of its last computation: buffers, network, paths
+    samples: per pixel of `reference` so far
+    """
+
+    place: Place
+    renderer: Renderer
+    predict: Predict
+    seconds: dict[str, float] = field(default_factory=dict)
+    samples: int = 0
+    _buffers: Tensor | None = None
+    _prediction: Tensor | None = None
+    _total: Tensor | None = None
+    _finite: Tensor | None = None
+
+    @property
+    def buffers(self) -> Tensor:
+        """[H, W, C] on the CPU."""
+        if self._buffers is None:
+            self._buffers = self._timed("buffers", self._render_buffers)
+        return self._buffers
+
+    @property
+    def prediction(self) -> Tensor:
+        """[H, W, 3] linear radiance; negative where the network says so."""
+        if self._prediction is None:
+            buffers = self.buffers
+            self._prediction = self._timed(
+                "network", lambda: torch.expm1(self.predict(buffers, self.place.tensor()))
+            )
+        return self._prediction
+
+    @property
+    def reference(self) -> Tensor:
+        """[H, W, 3] linear radiance: the mean over all passes, the first of which it does itself.
+
+        A pass's pixels that are NaN or Inf are left out, as in the test frames' references.
+        """
+        if self._total is None:
+            self.trace()
+        assert self._total is not None
+        assert self._finite is not None
+        return (self._total / self._finite).float()
+
+    def trace(self) -> None:
+        """Adds a pass to the reference."""
+        radiance = self._timed("paths", self._trace_pass)
+        finite = radiance.isfinite().all(dim=-1, keepdim=True)
+        visible = torch.where(finite, radiance, 0.0)
+        self._total = visible if self._total is None else self._total + visible
+        self._finite = finite.double() if self._finite is None else self._finite + finite
+        self.samples += PASS_SAMPLES
+
+    def forget_prediction(self) -> None:
+        """The network has changed."""
+        self._prediction = None
+
+    def _render_buffers(self) -> Tensor:
+        return self.renderer.image_buffers(
+            self.place.tensor(), resolution=self.place.resolution
+        ).cpu()
+
+    def _trace_pass(self) -> Tensor:
+        radiance = self.renderer.render_image(
+            self.place.tensor(),
+            resolution=self.place.resolution,
+            samples_per_pixel=PASS_SAMPLES,
+            seed=self.samples // PASS_SAMPLES,
+        )
+        return radiance.cpu().double()
+
+    def _timed(self, part: str, compute: Callable[[], Tensor]) -> Tensor:
+        begin = perf_counter()
+        result = compute()
+        self.seconds[part] = perf_counter() - begin
+        return result

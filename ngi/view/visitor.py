@@ -1,0 +1,209 @@
+"""One browser that looks at a page: its controls, its camera, its picture."""
+
+from __future__ import annotations
+
+import io
+import shlex
+from collections import deque
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import viser
+from PIL import Image
+
+from ngi.evaluate import dssim, mae, mape, tone_map
+from ngi.render.exr import write_exr
+from ngi.view.panel import Panel
+from ngi.view.scene_view import Place
+from ngi.view.screen import Pixels
+from ngi.view.session import Wish
+from ngi.view.studio import Shown, Studio
+from ngi.view.subject import Subject
+
+RATE_OVER = 2.0
+"""Seconds over which pictures per second are counted."""
+GREY = 24
+"""Of what is beside the picture where the window has another shape."""
+
+
+class Visitor:
+    """Tells the studio what its browser wants, and the browser what the studio has made."""
+
+    def __init__(
+        self, client: viser.ClientHandle, subject: Subject, studio: Studio, *, resolution: int
+    ) -> None:
+        self._client = client
+        self._subject = subject
+        self._studio = studio
+        self._last: Shown | None = None
+        self._aspect = 1.0
+        self._moments: deque[float] = deque(maxlen=100)
+        start = next(iter(subject.presets.values()))
+        self._panel = Panel(
+            client.gui,
+            controls=subject.controls,
+            v=start,
+            presets=dict(subject.presets),
+            buffers=subject.buffers,
+            resolution=resolution,
+            epsilon=subject.protocol.epsilon,
+            on_change=self._changed,
+        )
+        self._add_files()
+        client.camera.on_update(self._refit)
+        if subject.camera is not None:
+            self._aim()
+            client.camera.on_update(self._walk)
+
+    @property
+    def wish(self) -> Wish:
+        return Wish(Place(self._panel.v, self._panel.resolution), self._panel.screen)
+
+    def show(self, shown: Shown) -> None:
+        """Sends a picture; in the thread that made it."""
+        begin = perf_counter()
+        self._send(shown)
+        self._moments.append(perf_counter())
+        self._panel.status.content = self._status(shown, sending=perf_counter() - begin)
+
+    def _send(self, shown: Shown) -> None:
+        self._last, self._aspect = shown, self._client.camera.aspect
+        self._client.scene.set_background_image(
+            _fitted(shown.pixels, self._aspect), format="png" if shown.full else "jpeg"
+        )
+        self._client.flush()
+
+    def _refit(self, mine: viser.CameraHandle) -> None:
+        """Sends the picture again where the window has got another shape."""
+        if self._last is not None and not np.isclose(mine.aspect, self._aspect):
+            self._send(self._last)
+
+    def _changed(self) -> None:
+        self._studio.change(self._client.client_id, self.wish)
+        self._command.value = self._command_line()
+        if self._subject.camera is not None:
+            self._aim()
+
+    def _aim(self) -> None:
+        """Puts the browser's camera where v has the scene's."""
+        camera = self._subject.camera
+        assert camera is not None
+        origin, target = camera.view(self._panel.v)
+        mine = self._client.camera
+        if np.allclose(mine.position, origin, atol=1e-4) and np.allclose(
+            mine.look_at, target, atol=1e-4
+        ):
+            return
+        with self._client.atomic():
+            mine.up_direction = np.asarray(camera.up)
+            mine.position = origin
+            mine.look_at = target
+
+    def _walk(self, mine: viser.CameraHandle) -> None:
+        """Takes over into v where a mouse has moved the browser's camera."""
+        camera = self._subject.camera
+        assert camera is not None
+        v = np.array(self._panel.v)
+        moved = camera.components(mine.position, mine.look_at)
+        if np.allclose(v[camera.part], moved, atol=1e-3):
+            return
+        v[camera.part] = moved
+        self._panel.set_v(v.tolist())
+
+    def _status(self, shown: Shown, *, sending: float) -> str:
+        view = shown.view
+        parts = {**view.seconds, "sending": sending}
+        lines = [
+            f"{view.place.resolution} × {view.place.resolution} pixels",
+            ", ".join(f"{name} {1e3 * seconds:.0f} ms" for name, seconds in parts.items()),
+        ]
+        if (rate := self._pictures_per_second()) is not None:
+            lines.append(f"{rate:.1f} pictures per second")
+        if shown.wish.screen.traces_paths:
+            lines.append(f"{view.samples} samples per pixel")
+            lines.append(self._metrics(shown))
+        return "  \n".join(lines)
+
+    def _pictures_per_second(self) -> float | None:
+        """Over the last seconds; None where nothing has moved."""
+        recent = [moment for moment in self._moments if moment > self._moments[-1] - RATE_OVER]
+        if len(recent) < 2:
+            return None
+        return (len(recent) - 1) / (recent[-1] - recent[0])
+
+    def _metrics(self, shown: Shown) -> str:
+        protocol = self._subject.protocol
+        prediction, reference = shown.view.prediction, shown.view.reference
+        picture, wanted = (tone_map(image, protocol.exposure) for image in (prediction, reference))
+        metrics = {
+            "MAPE": mape(prediction, reference, protocol.epsilon),
+            "DSSIM": dssim(picture, wanted, window=protocol.ssim_window, sigma=protocol.ssim_sigma),
+            "MAE": mae(prediction, reference),
+        }
+        return ", ".join(f"{name} {value:.3g}" for name, value in metrics.items())
+
+    def _add_files(self) -> None:
+        gui, client = self._client.gui, self._client
+        with gui.add_folder("Files", expand_by_default=False):
+            self._command: Any = gui.add_text("command", self._command_line(), disabled=True)
+            png, exr, save = (
+                gui.add_button(name) for name in ("picture (PNG)", "radiance (EXR)", "save v")
+            )
+            upload = gui.add_upload_button("load v", mime_type="application/json")
+
+        @png.on_click
+        def _(_: object) -> None:
+            if self._last is not None:
+                buffer = io.BytesIO()
+                Image.fromarray(self._last.pixels).save(buffer, "PNG")
+                client.send_file_download("picture.png", buffer.getvalue(), save_immediately=True)
+
+        @exr.on_click
+        def _(_: object) -> None:
+            if self._last is not None:
+                client.send_file_download("picture.exr", _exr(self._last), save_immediately=True)
+
+        @save.on_click
+        def _(_: object) -> None:
+            client.send_file_download("v.json", self._panel.saved(), save_immediately=True)
+
+        @upload.on_upload
+        def _(_: object) -> None:
+            try:
+                self._panel.load(upload.value.content)
+            except ValueError as error:
+                client.add_notification("This file cannot be loaded", str(error), color="red")
+
+    def _command_line(self) -> str:
+        v = ",".join(f"{number:.6g}" for number in self._panel.v)
+        return shlex.join(
+            [
+                *("python", "-m", "ngi.render", f"run={self._subject.folder}", f"v=[{v}]"),
+                *(f"resolution={self._panel.resolution}", "out=picture.png"),
+            ]
+        )
+
+
+def _exr(shown: Shown) -> bytes:
+    """Radiance of the first picture that is shown; the network's where that is a buffer."""
+    traced = shown.wish.screen.parts[0] == "path tracer"
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "picture.exr"
+        write_exr(path, shown.view.reference if traced else shown.view.prediction)
+        return path.read_bytes()
+
+
+def _fitted(pixels: Pixels, aspect: float) -> Pixels:
+    """The picture amid grey, so that a window of this aspect (width / height) does not stretch it.
+
+    pixels: [H, W, 3]
+    """
+    height, width = pixels.shape[:2]
+    wanted = (max(height, round(width / aspect)), max(width, round(height * aspect)))
+    canvas = np.full((*wanted, 3), GREY, dtype=np.uint8)
+    top, left = (wanted[0] - height) // 2, (wanted[1] - width) // 2
+    canvas[top : top + height, left : left + width] = pixels
+    return canvas

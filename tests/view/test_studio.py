@@ -1,0 +1,187 @@
+"""Pictures for several browsers, from closed formulas: the same numbers as without a viewer."""
+
+from threading import Thread
+from time import monotonic, sleep
+
+import numpy as np
+import pytest
+import torch
+from torch import Tensor
+
+from ngi.evaluate.pictures import error_picture, srgb_picture
+from ngi.render import AnalyticRenderer
+from ngi.view.scene_view import PASS_SAMPLES, Place, SceneView
+from ngi.view.screen import PARTS, Screen
+from ngi.view.session import SETTLED, Wish
+from ngi.view.studio import KEPT, Shown, Studio
+from ngi.view.tone import CURVES, shown
+
+V = (0.2, 0.5, 0.8)
+
+
+def predict(buffers: Tensor, scene_vector: Tensor) -> Tensor:
+    return torch.log1p(buffers[..., :3].abs() * (1 + scene_vector[0]))
+
+
+def renderer(noise: float = 0.0) -> AnalyticRenderer:
+    return AnalyticRenderer(dimensions=3, patch_size=16, noise=noise)
+
+
+def settled(studio: Studio) -> None:
+    sleep(SETTLED)
+    while studio.work(wait=0):
+        pass
+
+
+def test_the_picture_is_the_one_computed_without_a_viewer() -> None:
+    pictures: list[Shown] = []
+    studio = Studio(renderer=renderer(), predict=predict)
+    studio.open("a", Wish(Place(V, 40), Screen(exposure=1.0)), pictures.append)
+    assert studio.work(wait=0)
+    assert not studio.work(wait=0)
+    v = torch.tensor(V)
+    expected = torch.expm1(predict(renderer().image_buffers(v, resolution=40), v))
+    np.testing.assert_array_equal(pictures[0].pixels, srgb_picture(expected, 1.0))
+    assert pictures[0].full
+    assert set(pictures[0].view.seconds) == {"buffers", "network"}
+
+
+def test_side_by_side_with_the_reference_and_the_error() -> None:
+    view = SceneView(Place(V, 32), renderer(), predict)
+    v = torch.tensor(V)
+    reference = renderer().render_image(v, resolution=32, samples_per_pixel=1, seed=0)
+    pixels = Screen("network | path tracer | error", epsilon=0.01).pixels(view)
+    assert pixels.shape == (32, 96, 3)
+    np.testing.assert_array_equal(pixels[:, 32:64], srgb_picture(reference, 0.0))
+    np.testing.assert_array_equal(
+        pixels[:, 64:], error_picture(view.prediction, reference.float(), 0.01)
+    )
+
+
+def test_more_passes_make_less_noise() -> None:
+    view, v = SceneView(Place(V, 32), renderer(noise=0.5), predict), torch.tensor(V)
+    truth = renderer().render_image(v, resolution=32, samples_per_pixel=1, seed=0)
+    first = (view.reference - truth).std().item()
+    for _ in range(15):
+        view.trace()
+    assert view.samples == 16 * PASS_SAMPLES
+    assert (view.reference - truth).std().item() == pytest.approx(first / 4, rel=0.15)
+
+
+def test_pixels_that_are_not_finite_are_left_out_of_the_mean() -> None:
+    class Spotted(AnalyticRenderer):
+        def render_image(self, *arguments: Tensor, **options: int) -> Tensor:
+            image = super().render_image(*arguments, **options)  # type: ignore[arg-type]
+            if options["seed"] == 0:
+                image[0, 0] = torch.nan
+            return image
+
+    view = SceneView(Place(V, 32), Spotted(dimensions=3, patch_size=16), predict)
+    view.trace()
+    assert view.reference[0, 0].isnan().all()
+    view.trace()
+    assert view.reference.isfinite().all()
+
+
+def test_browsers_take_turns_and_new_pictures_come_before_better_ones() -> None:
+    order: list[tuple[str, int]] = []
+    studio = Studio(renderer=renderer(), predict=predict)
+    for name, show in (("a", "path tracer"), ("b", "path tracer"), ("c", "network")):
+        studio.open(
+            name,
+            Wish(Place(V, 32), Screen(show)),
+            lambda made, name=name: order.append((name, made.view.samples)),  # type: ignore[misc]
+        )
+    for _ in range(5):
+        studio.work(wait=0)
+    assert [name for name, _ in order] == ["a", "b", "c", "a", "b"]
+    assert [samples for _, samples in order] == [8, 8, 8, 16, 24]  # one place, seen by two
+
+
+def test_a_browser_that_is_gone_gets_nothing() -> None:
+    pictures: list[Shown] = []
+    studio = Studio(renderer=renderer(), predict=predict)
+    studio.open("a", Wish(Place(V, 32), Screen()), pictures.append)
+    studio.close("a")
+    studio.change("a", Wish(Place(V, 64), Screen()))
+    assert not studio.work(wait=0)
+    assert pictures == []
+
+
+def test_waiting_ends_when_something_is_wanted() -> None:
+    studio = Studio(renderer=renderer(), predict=predict)
+    pictures: list[Shown] = []
+    opening = Thread(
+        target=lambda: (sleep(0.2), studio.open("a", Wish(Place(V, 32), Screen()), pictures.append))
+    )
+    begin = monotonic()
+    opening.start()
+    assert studio.work(wait=60)
+    assert monotonic() - begin < 30
+    opening.join()
+
+
+def test_no_backlog_of_pictures_while_a_slider_moves() -> None:
+    pictures: list[Shown] = []
+    studio = Studio(renderer=renderer(), predict=predict)
+    studio.open("a", Wish(Place(V, 256), Screen()), pictures.append)
+    studio.work(wait=0)
+    for step in range(50):
+        studio.change("a", Wish(Place((step / 50, 0.5, 0.8), 256), Screen()))
+    studio.work(wait=0)
+    settled(studio)
+    assert [made.view.place.resolution for made in pictures] == [256, 64, 256]
+    assert pictures[-1].view.place.v[0] == 0.98
+    assert [made.full for made in pictures] == [True, False, True]
+
+
+def test_a_network_that_has_learnt_is_shown_again() -> None:
+    factor = [1.0]
+    pictures: list[Shown] = []
+    studio = Studio(renderer=renderer(), predict=lambda b, v: predict(b, v) * factor[0])
+    studio.open("a", Wish(Place(V, 32), Screen()), pictures.append)
+    studio.work(wait=0)
+    factor[0] = 0.5
+    assert not studio.work(wait=0)
+    studio.network_changed()
+    assert studio.work(wait=0)
+    assert (pictures[1].pixels != pictures[0].pixels).any()
+    assert pictures[1].view is pictures[0].view  # its buffers and paths are kept
+
+
+def test_only_some_views_are_kept() -> None:
+    pictures: list[Shown] = []
+    studio = Studio(renderer=renderer(), predict=predict)
+    for step in range(2 * KEPT):
+        studio.open("a", Wish(Place((step / 99, 0, 0), 32), Screen()), pictures.append)
+        studio.work(wait=0)
+    assert len(studio._views) == KEPT
+
+
+def test_every_buffer_and_part_can_be_shown() -> None:
+    view = SceneView(Place(V, 32), renderer(), predict)
+    for name in (*PARTS, *view.renderer.layout.names):
+        pixels = Screen(name).pixels(view)
+        assert pixels.dtype == np.uint8
+        assert pixels.shape == (32, 32 * len(Screen(name).parts), 3)
+
+
+def test_tone_curves() -> None:
+    radiance = torch.tensor([[[0.0, 0.18, 1.0], [4.0, -1.0, torch.nan]]])
+    linear = shown(radiance, curve="linear", exposure=1.0)
+    assert linear[0, 0].tolist() == pytest.approx([0, 0.36, 1])
+    assert linear[0, 1, :2].tolist() == [1, 0]
+    for curve in CURVES:
+        values = shown(radiance, curve=curve, exposure=0.0)
+        assert values[0, 1, 2].isnan()
+        finite = values[~values.isnan()]
+        assert ((finite >= 0) & (finite <= 1)).all()
+    # Narkowicz 2015: x (2.51 x + 0.03) / (x (2.43 x + 0.59) + 0.14), then the sRGB curve
+    x = 0.18
+    expected = (
+        1.055 * ((x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14)) ** (1 / 2.4) - 0.055
+    )
+    filmic = shown(radiance, curve="filmic", exposure=0.0)
+    assert filmic[0, 0, 1].item() == pytest.approx(expected, rel=1e-5)
+    with pytest.raises(ValueError, match="curve 'pink'"):
+        shown(radiance, curve="pink", exposure=0.0)
