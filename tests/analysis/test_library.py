@@ -1,3 +1,4 @@
+import math
 import subprocess
 import sys
 from pathlib import Path
@@ -112,3 +113,28 @@ def test_importing_the_library_loads_nothing_heavy() -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, cwd=REPOSITORY
     )
     assert answer.stdout.strip() == "[]", answer.stderr
+
+
+def test_the_steps_that_a_method_had_no_time_for(make_method, tmp_path) -> None:
+    """One method is the baseline with every step a quarter slower, the other 10 % worse."""
+    for seed in range(2):
+        make_method("uniform", seed=seed)
+        slower = make_method("active_exploration", seed=seed) / "metrics.csv"
+        rows = pd.read_csv(slower)
+        rows["run_seconds"] *= 1.25
+        rows.query("run_seconds <= 240").to_csv(slower, index=False)
+        make_method("metropolis", seed=seed, error=0.11)
+    answer = subprocess.run(
+        [sys.executable, "-W", "error", "-m", "analysis.examples.same_steps", tmp_path / "runs"],
+        capture_output=True,
+        text=True,
+        cwd=REPOSITORY,
+    )
+    assert answer.returncode == 0, answer.stderr
+    _, slower, time, steps, worse, *both = answer.stdout.splitlines()
+    assert slower == "active_exploration: 2 runs, 0.750 of the steps"
+    expected = (1 + 7 * math.exp(-1.8)) / (1 + 7 * math.exp(-2.4))
+    assert float(time.split()[4]) == pytest.approx(100 * (expected - 1), abs=0.1)
+    assert steps.split()[4] == "+0.0"
+    assert worse == "metropolis: 2 runs, 1.000 of the steps"
+    assert [line.split()[4] for line in both] == ["+10.0", "+10.0"]
