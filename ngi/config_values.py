@@ -20,6 +20,8 @@ _BESIDE: dict[str, Any] = {
     "evaluation.count": int,
     "run.checkpoint_seconds": float,
     "run.checkpoint_steps": int | None,
+    "run.viewer_port": int,
+    "viewer": bool,
 }
 """Kinds of values that are no argument of a class."""
 

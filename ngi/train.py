@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import sys
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,13 +27,15 @@ from ngi.run_name import run_group, run_name
 from ngi.scene import scenes
 
 if TYPE_CHECKING:
-    from ngi.learn import Budget, Costs, Interruption, RunFolder, Tracker
+    from ngi import learn
+    from ngi.learn.lightning_api import Callback, Trainer
     from ngi.render import Renderer
 
 log = logging.getLogger(__name__)
 
 NOT_IDENTITY = (
     "run",
+    "viewer",
     "tracker",
     "label",
     "budget.costs",
@@ -80,11 +83,11 @@ def train(config: DictConfig) -> dict[str, Any]:
 
 def _train(
     config: DictConfig,
-    budget: Budget,
+    budget: learn.Budget,
     renderer: Renderer,
-    folder: RunFolder,
-    tracker: Tracker,
-    interruption: Interruption,
+    folder: learn.RunFolder,
+    tracker: learn.Tracker,
+    interruption: learn.Interruption,
 ) -> dict[str, Any]:
     from ngi import learn
     from ngi.patches import Patches
@@ -98,13 +101,7 @@ def _train(
     )
     recorder = learn.Recorder(
         evaluator=instantiate(config.evaluation.evaluator)(renderer=renderer),
-        target_map=None
-        if config.evaluation.target_map is None
-        else instantiate(config.evaluation.target_map)(
-            renderer=renderer,
-            resolution=instantiate(config.resolution).resolution(0),
-            signals=interruption.checked(module.signals),
-        ),
+        target_map=_target_map(config, renderer, signals=interruption.checked(module.signals)),
         predict=interruption.checked(module.predict),
         folder=folder,
         stream=stream,
@@ -114,27 +111,19 @@ def _train(
         label={**plain(config.label), "seed": config.seed},
         backend=renderer.description,
     )
-    trainer = instantiate(config.trainer)(
-        default_root_dir=folder.path,
-        max_steps=budget.maximum_steps,
-        callbacks=learn.callbacks(
-            stream=stream,
-            clock=clock,
-            run_clock=run_clock,
-            folder=folder,
-            tracker=tracker,
-            budget=budget,
-            recorder=recorder,
-            evaluations=config.evaluation.count,
-            checkpoint_seconds=config.run.checkpoint_seconds,
-            checkpoint_steps=config.run.checkpoint_steps,
-            interruption=interruption,
-        ),
-        plugins=[
-            learn.AtomicCheckpointIO(identity=folder.identity, previous=folder.previous_checkpoint)
-        ],
+    callbacks = learn.callbacks(
+        stream=stream,
+        clock=clock,
+        run_clock=run_clock,
+        folder=folder,
+        tracker=tracker,
+        budget=budget,
+        recorder=recorder,
+        evaluations=config.evaluation.count,
+        checkpoint_seconds=config.run.checkpoint_seconds,
+        checkpoint_steps=config.run.checkpoint_steps,
+        interruption=interruption,
     )
-    datamodule = learn.ExplorationDataModule(stream=stream)
     module.rehearse(
         Patches.blank(
             2,
@@ -143,19 +132,87 @@ def _train(
             patch_size=renderer.patch_size,
         )
     )
+    if config.viewer:
+        callbacks.append(_live_view(config, renderer, module, stream, folder, clock))
+    trainer = _trainer(config, budget, folder, callbacks)
     checkpoint = learn.prepare_resume(folder)
     folder.begin()
     recorder.prepare()
     renderer.warm_up()
     with interruption.deferred():
-        trainer.fit(module, datamodule, ckpt_path=checkpoint, weights_only=True)
+        trainer.fit(
+            module,
+            learn.ExplorationDataModule(stream=stream),
+            ckpt_path=checkpoint,
+            weights_only=True,
+        )
     module.to(trainer.strategy.root_device)  # Lightning has taken it back to the CPU
     for optimizer in trainer.optimizers:
         optimizer.load_state_dict(optimizer.state_dict())  # moves its state to the weights
     return recorder.finish()
 
 
-def _settings(config: DictConfig, *, scene_hash: str, costs: Costs | None) -> dict[str, Any]:
+def _trainer(
+    config: DictConfig,
+    budget: learn.Budget,
+    folder: learn.RunFolder,
+    callbacks: list[Callback],
+) -> Trainer:
+    from ngi import learn
+
+    checkpoints = learn.AtomicCheckpointIO(
+        identity=folder.identity, previous=folder.previous_checkpoint
+    )
+    trainer: Trainer = instantiate(config.trainer)(
+        default_root_dir=folder.path,
+        max_steps=budget.maximum_steps,
+        callbacks=callbacks,
+        plugins=[checkpoints],
+    )
+    return trainer
+
+
+def _target_map(
+    config: DictConfig, renderer: Renderer, *, signals: Callable[..., Any]
+) -> learn.TargetMap | None:
+    """What is measured of the target density at every evaluation, where that is asked for."""
+    if config.evaluation.target_map is None:
+        return None
+    target_map: learn.TargetMap = instantiate(config.evaluation.target_map)(
+        renderer=renderer,
+        resolution=instantiate(config.resolution).resolution(0),
+        signals=signals,
+    )
+    return target_map
+
+
+def _live_view(
+    config: DictConfig,
+    renderer: Renderer,
+    module: learn.IlluminationModule,
+    stream: learn.TrainingStream,
+    folder: learn.RunFolder,
+    clock: learn.PhaseClock,
+) -> Callback:
+    """The run in the browser; RuntimeError where the libraries for it are not installed."""
+    try:
+        from ngi.view.live import live_view
+    except ModuleNotFoundError as error:
+        raise RuntimeError(f"viewer=true needs {error.name}: pip install -e .[viewer]") from error
+    return live_view(
+        renderer=renderer,
+        module=module,
+        stream=stream,
+        folder=folder,
+        clock=clock,
+        scene_name=config.scene.name,
+        description=instantiate(config.scene.reader) if "scene" in config.renderer else None,
+        protocol=instantiate(config.evaluation.evaluator.protocol),
+        port=config.run.viewer_port,
+    )
+
+
+def _settings(config: DictConfig, *, scene_hash: str, costs: learn.Costs | None) -> dict[str, Any]:
     """What decides the result. Scene and costs count by content, not by where they lie."""
     settings = plain(config)
     for key in NOT_IDENTITY:

@@ -101,6 +101,11 @@ class TrainingStream(IterableDataset[Batch]):
         self._saved_stores: list[dict[str, Any]] = []  # of the last two checkpoints
         self._pending: Batch | None = None
 
+    @property
+    def chains(self) -> ChainState:
+        """Where the chains stand."""
+        return self._chains
+
     def __len__(self) -> int:
         return ENDLESS
 

@@ -126,6 +126,11 @@ class PatchStore:
         uniform = torch.rand(count, dtype=torch.float64, generator=generator) * cumulative[-1]
         return self._ids[torch.searchsorted(cumulative, uniform, right=True)]
 
+    def hardest(self, count: int) -> tuple[Tensor, Tensor]:
+        """Ids and losses of the patches of the highest recorded losses, at most `count` each."""
+        losses, slots = self._losses[: len(self)].topk(min(count, len(self)))
+        return self._ids[slots], losses
+
     def update(self, ids: Tensor, losses: Tensor) -> None:
         """Records the losses [n] of n patches; an id that stands twice keeps the last one.
 

@@ -36,6 +36,16 @@ class Page:
         self._server.on_client_disconnect(lambda client: studio.close(client.client_id))
         self.address = f"http://{host}:{self._server.get_port()}"
 
+    @property
+    def gui(self) -> viser.GuiApi:
+        """What is added here all browsers share."""
+        return self._server.gui
+
+    @property
+    def visitors(self) -> int:
+        """Browsers that look at the page."""
+        return len(self._server.get_clients())
+
     def close(self) -> None:
         self._server.stop()
 

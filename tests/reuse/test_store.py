@@ -176,3 +176,14 @@ def test_bad_input_is_named_and_changes_nothing(make_patches) -> None:
     assert torch.equal(before.pop("losses"), after.pop("losses"))
     assert before == after
     assert (store.get(ids).scene_vector[:, 0] * 2**20).tolist() == [0, 1, 2, 3]
+
+
+def test_the_hardest_patches_are_those_of_the_highest_losses(make_patches) -> None:
+    store = filled(make_patches, [0.3, 0.9, 0.1, 0.5], capacity=5)
+    ids, losses = store.hardest(2)
+    assert ids.tolist() == [1, 3]
+    assert losses.tolist() == pytest.approx([0.9, 0.5])
+    store.update(torch.tensor([2]), torch.tensor([7.0]))
+    assert store.hardest(1)[0].tolist() == [2]
+    assert store.hardest(99)[0].tolist() == [2, 1, 3, 0]
+    assert len(PatchStore(capacity=5, layout=LAYOUT).hardest(3)[0]) == 0

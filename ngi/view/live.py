@@ -1,0 +1,168 @@
+"""The page of a run that trains: pictures are made between its steps, while its clock stands."""
+
+from __future__ import annotations
+
+import logging
+from collections import deque
+from collections.abc import Sequence
+from pathlib import Path
+from time import monotonic
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import torch
+import viser
+from torch import Tensor
+
+from ngi.evaluate import EvaluationProtocol
+from ngi.learn import IlluminationModule, PhaseClock, RunFolder, TrainingStream
+from ngi.learn.lightning_api import Callback
+from ngi.render import Renderer
+from ngi.scene import SceneDescription
+from ngi.view.page import Page
+from ngi.view.studio import Studio
+from ngi.view.subject import subject
+from ngi.view.training_figure import Axis, Visited, training_figure
+
+log = logging.getLogger(__name__)
+
+SHARE = 0.5
+"""Most of the wall time that the page takes."""
+REFRESH = 5.0
+"""Seconds between two pictures of the training, at least."""
+LAST = 1e12
+"""Place of a folder below all others; viser counts up as parts are added."""
+HARDEST = 8
+KEPT_BATCHES = 60
+"""Generated batches whose proposals are shown."""
+
+
+class LiveView(Callback):
+    """Shows the network as it is, and what the run does, to all browsers that look at `page`.
+
+    Nothing that training depends on is changed. The clock stands still meanwhile, as in an
+    evaluation, and for each second spent here a second is trained.
+
+    variables: names of the components of v
+    """
+
+    def __init__(
+        self,
+        *,
+        page: Page,
+        studio: Studio,
+        stream: TrainingStream,
+        folder: RunFolder,
+        clock: PhaseClock,
+        variables: Sequence[str],
+    ) -> None:
+        self._page = page
+        self._studio = studio
+        self._stream = stream
+        self._folder = folder
+        self._clock = clock
+        self._panel = TrainingPanel(page.gui, [*variables, "patch x", "patch y"])
+        self._visited: deque[tuple[Tensor, Tensor]] = deque(maxlen=KEPT_BATCHES)
+        self._free_from = self._refresh_from = 0.0
+
+    def on_train_batch_end(self, *_: Any) -> None:
+        self._remember()
+        begin = monotonic()
+        if begin < self._free_from or not self._page.visitors:
+            return
+        self._stream.finish_rendering()
+        with self._clock.phase("evaluate"):
+            if begin >= self._refresh_from:
+                self._studio.network_changed()
+                self._refresh()
+                self._refresh_from = monotonic() + REFRESH
+            self._studio.work(wait=0)
+        spent = monotonic() - begin
+        self._free_from = monotonic() + spent * (1 / SHARE - 1)
+
+    def on_train_end(self, *_: Any) -> None:
+        self._page.close()
+
+    def on_exception(self, *_: Any) -> None:
+        self._page.close()
+
+    def _remember(self) -> None:
+        record = self._stream.chain_record
+        if record is not None and "position" in record:
+            states = torch.from_numpy(np.asarray(record["position"]))
+            self._visited.append((states, torch.from_numpy(record["target_proposed"])))
+
+    def _refresh(self) -> None:
+        store, current = self._stream.store, self._stream.chains.position
+        ids, losses = store.hardest(HARDEST)
+        self._folder.steps.flush()
+        states, densities = zip(*self._visited, strict=True) if self._visited else ((), ())
+        empty = torch.empty(0, current.shape[1])
+        self._panel.show(
+            evaluations=_rows(self._folder.metrics.path),
+            steps=_rows(self._folder.steps.path),
+            visited=Visited(
+                torch.cat([empty, *states]), torch.cat([torch.empty(0), *densities]), current
+            ),
+            patches=store.get(ids).log_radiance,
+            losses=losses.tolist(),
+        )
+
+
+def live_view(
+    *,
+    renderer: Renderer,
+    module: IlluminationModule,
+    stream: TrainingStream,
+    folder: RunFolder,
+    clock: PhaseClock,
+    scene_name: str,
+    description: SceneDescription | None,
+    protocol: EvaluationProtocol,
+    port: int,
+) -> LiveView:
+    """The page of a run, served on this machine at `port` until the training ends.
+
+    description: of the scene; None for closed formulas
+    """
+    about = subject(
+        name=f"{scene_name}, training",
+        folder=folder.path,
+        description=description,
+        renderer=renderer,
+        protocol=protocol,
+    )
+    studio = Studio(renderer=renderer, predict=module.predict)
+    page = Page(studio, about, resolution=protocol.resolution, host="127.0.0.1", port=port)
+    log.info("%s shows the training", page.address)
+    return LiveView(
+        page=page,
+        studio=studio,
+        stream=stream,
+        folder=folder,
+        clock=clock,
+        variables=[f"{control.group} {control.name}" for control in about.controls],
+    )
+
+
+class TrainingPanel:
+    """A folder of the page that all browsers share."""
+
+    def __init__(self, gui: viser.GuiApi, components: Sequence[str]) -> None:
+        self._axes = {name: Axis(name, index) for index, name in enumerate(components)}
+        with gui.add_folder("Training", order=LAST):
+            self._across = gui.add_dropdown("chains, across", components)
+            self._up = gui.add_dropdown("chains, up", components, initial_value=components[1])
+            self._image = gui.add_image(np.full((8, 8, 3), 255, np.uint8), format="png")
+
+    def show(self, **what: Any) -> None:
+        """what: arguments of `training_figure` but for the axes, which browsers choose."""
+        self._image.image = training_figure(
+            across=self._axes[self._across.value], up=self._axes[self._up.value], **what
+        )
+
+
+def _rows(path: Path) -> pd.DataFrame:
+    """What of a log is on the disk."""
+    return pd.read_csv(path) if path.exists() and path.stat().st_size else pd.DataFrame()

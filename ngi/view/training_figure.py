@@ -1,0 +1,129 @@
+"""A run in one picture while it trains: errors, losses and reuse, chains, the hardest patches."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+import torch
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.gridspec import SubplotSpec
+from torch import Tensor
+
+from ngi.evaluate import METRICS, tone_map
+from ngi.evaluate.pictures import eight_bit
+from ngi.view.screen import Pixels
+
+COLOURS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7")
+WIDTH, HEIGHT, DOTS_PER_INCH = 4.2, 12.0, 100
+PATCH_COLUMNS = 4
+
+
+@dataclass(frozen=True)
+class Visited:
+    """Where chains have been.
+
+    states: [m, D + 2] proposals, scene vector and patch position in [0, 1], oldest first
+    densities: [m], their target densities; NaN where nothing was scored
+    current: [n, D + 2], where the chains stand
+    """
+
+    states: Tensor
+    densities: Tensor
+    current: Tensor
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A component of a state, and what it is called."""
+
+    name: str
+    component: int
+
+
+def training_figure(
+    *,
+    evaluations: pd.DataFrame,
+    steps: pd.DataFrame,
+    visited: Visited,
+    across: Axis,
+    up: Axis,
+    patches: Tensor,
+    losses: Sequence[float],
+) -> Pixels:
+    """[H, W, 3].
+
+    evaluations, steps: rows of metrics.csv and steps.csv
+    patches: [k, P, P, 3] log1p radiance of the stored patches of the highest losses
+    """
+    figure = Figure(figsize=(WIDTH, HEIGHT), dpi=DOTS_PER_INCH, layout="constrained")
+    canvas = FigureCanvasAgg(figure)
+    grid = figure.add_gridspec(4, 1, height_ratios=(1, 1, 1.2, 0.8))
+    _errors(figure.add_subplot(grid[0]), evaluations)
+    _losses(figure.add_subplot(grid[1]), steps)
+    _chains(figure.add_subplot(grid[2]), visited, across, up)
+    _patches(figure, grid[3], patches, losses)
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba())[..., :3].copy()
+
+
+def _errors(axes: Axes, evaluations: pd.DataFrame) -> None:
+    axes.set(title="error on hard frames", xlabel="run time in seconds")
+    shown = False
+    for metric, colour in zip(METRICS, COLOURS, strict=True):
+        key = f"hard_{metric}"
+        if key in evaluations and evaluations[key].notna().any():
+            rows = evaluations[["run_seconds", key]].dropna()
+            axes.plot(*rows.to_numpy().T, "o-", ms=3, color=colour, label=metric.upper())
+            shown = True
+    if shown:
+        axes.set_yscale("log")
+        axes.legend(frameon=False, fontsize=8)
+
+
+def _losses(axes: Axes, steps: pd.DataFrame) -> None:
+    axes.set(title="loss and reuse", xlabel="run time in seconds", ylim=(0, None))
+    every = max(1, len(steps) // 500)
+    for key, colour, label in (
+        ("loss_new", COLOURS[0], "new samples"),
+        ("loss_existing", COLOURS[1], "stored samples"),
+        ("reuse_probability", "#888888", "reuse probability"),
+    ):
+        if key in steps:
+            rows = steps[["run_seconds", key]].iloc[::every].dropna()
+            axes.plot(*rows.to_numpy().T, color=colour, label=label, lw=1.2)
+    if axes.lines:
+        axes.legend(frameon=False, fontsize=8)
+
+
+def _chains(axes: Axes, visited: Visited, across: Axis, up: Axis) -> None:
+    axes.set(title="chains", xlabel=across.name, ylabel=up.name, xlim=(0, 1), ylim=(0, 1))
+    columns = [across.component, up.component]
+    if len(visited.states):
+        horizontal, vertical = visited.states[:, columns].T.numpy()
+        points = axes.scatter(
+            horizontal,
+            vertical,
+            c=visited.densities.numpy(),
+            cmap="viridis",
+            norm="log" if (visited.densities > 0).any() else None,
+            plotnonfinite=True,
+            s=9,
+        )
+        axes.figure.colorbar(points, ax=axes, label="target density of proposals")
+    horizontal, vertical = visited.current[:, columns].T.numpy()
+    axes.scatter(horizontal, vertical, s=45, facecolors="none", edgecolors="#D55E00")
+
+
+def _patches(figure: Figure, place: SubplotSpec, patches: Tensor, losses: Sequence[float]) -> None:
+    rows = max(1, -(-len(patches) // PATCH_COLUMNS))
+    grid = place.subgridspec(rows, PATCH_COLUMNS)
+    for index, (patch, loss) in enumerate(zip(patches, losses, strict=True)):
+        axes = figure.add_subplot(grid[divmod(index, PATCH_COLUMNS)])
+        axes.imshow(eight_bit(tone_map(torch.expm1(patch.float()))))
+        axes.set_title(f"loss {loss:.3g}", fontsize=8)
+        axes.set_axis_off()

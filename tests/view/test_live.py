@@ -1,0 +1,136 @@
+"""A run with a page trains as one without, and the page shows what the run does."""
+
+import socket
+from pathlib import Path
+from time import monotonic, sleep
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+import torch
+
+from ngi.learn import PhaseClock
+from ngi.view import live
+from ngi.view.live import LiveView
+from ngi.view.training_figure import Axis, Visited, training_figure
+from tests.learn.command_line import run
+
+
+def figure(**changed: Any) -> np.ndarray:
+    generator = torch.Generator().manual_seed(0)
+    states = torch.rand(40, 4, generator=generator)
+    seconds = np.linspace(1, 50, 30)
+    arguments: dict[str, Any] = {
+        "evaluations": pd.DataFrame({"run_seconds": seconds, "hard_mape": 1 / seconds}),
+        "steps": pd.DataFrame(
+            {"run_seconds": seconds, "loss_new": 1 / seconds, "reuse_probability": 0.5}
+        ),
+        "visited": Visited(states, states[:, 0], states[:16]),
+        "across": Axis("lamp x", 0),
+        "up": Axis("patch y", 3),
+        "patches": torch.rand(8, 16, 16, 3, generator=generator),
+        "losses": [1.0 / (index + 1) for index in range(8)],
+    }
+    return training_figure(**{**arguments, **changed})
+
+
+def test_every_part_of_the_figure_shows_its_data() -> None:
+    usual = figure()
+    assert usual.dtype == np.uint8
+    assert usual.shape[2] == 3
+    states = torch.full((40, 4), 0.5)
+    for changed in (
+        {"evaluations": pd.DataFrame({"run_seconds": [1, 2], "hard_dssim": [0.3, 0.2]})},
+        {"steps": pd.DataFrame({"run_seconds": [1, 2], "loss_new": [3, 1]})},
+        {"visited": Visited(states, states[:, 0], states[:16])},
+        {"across": Axis("lamp y", 1)},
+        {"patches": torch.zeros(8, 16, 16, 3)},
+        {"losses": [5.0] * 8},
+    ):
+        assert (figure(**changed) != usual).any(), changed.keys()
+    np.testing.assert_array_equal(figure(), usual)
+
+
+def test_a_run_that_has_just_begun_has_a_figure_too() -> None:
+    empty = torch.empty(0, 4)
+    figure(
+        evaluations=pd.DataFrame(),
+        steps=pd.DataFrame(),
+        visited=Visited(empty, torch.empty(0), torch.zeros(16, 4)),
+        patches=torch.empty(0, 16, 16, 3),
+        losses=[],
+    )
+    figure(visited=Visited(torch.rand(5, 4), torch.full((5,), torch.nan), torch.zeros(16, 4)))
+
+
+def test_a_run_with_a_page_trains_as_one_without(tmp_path: Path) -> None:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    status, output = run(tmp_path, "run.folder=seen", "viewer=true", f"run.viewer_port={port}")
+    assert status == 0, output
+    assert f"http://127.0.0.1:{port} shows the training" in output
+    status, output = run(tmp_path, "run.folder=unseen")
+    assert status == 0, output
+    checkpoints = [
+        torch.load(tmp_path / name / "last.ckpt", weights_only=True) for name in ("seen", "unseen")
+    ]
+    for name, weights in checkpoints[0]["state_dict"].items():
+        assert torch.equal(weights, checkpoints[1]["state_dict"][name]), name
+    # who looks on is no part of a run's identity
+    assert checkpoints[0]["run_identity"] == checkpoints[1]["run_identity"]
+
+
+class Recorded:
+    """Stands for page, studio, stream and folder; keeps when what was asked for."""
+
+    def __init__(self, *, visitors: int) -> None:
+        self.visitors = visitors
+        self.calls: list[str] = []
+        self.gui = self.chains = self.store = None
+        self.chain_record = None
+
+    def finish_rendering(self) -> None:
+        self.calls.append("finish")
+
+    def work(self, *, wait: float) -> bool:
+        assert wait == 0
+        self.calls.append("work")
+        sleep(0.02)
+        return True
+
+    def network_changed(self) -> None:
+        self.calls.append("changed")
+
+
+@pytest.mark.parametrize("visitors", [0, 1])
+def test_the_clock_stands_still_and_half_of_the_time_is_training(
+    monkeypatch: pytest.MonkeyPatch, visitors: int
+) -> None:
+    monkeypatch.setattr(live, "TrainingPanel", lambda *_: SimpleNamespace(show=lambda **_: None))
+    monkeypatch.setattr(LiveView, "_refresh", lambda _: None)
+    recorded, clock = Recorded(visitors=visitors), PhaseClock()
+    view = LiveView(
+        page=recorded,  # type: ignore[arg-type]
+        studio=recorded,  # type: ignore[arg-type]
+        stream=recorded,  # type: ignore[arg-type]
+        folder=recorded,  # type: ignore[arg-type]
+        clock=clock,
+        variables=["x"],
+    )
+    clock.start()
+    begin = monotonic()
+    while monotonic() - begin < 0.5:
+        sleep(0.001)  # a step
+        view.on_train_batch_end()
+    clock.stop()
+    passed = monotonic() - begin
+    if not visitors:
+        assert recorded.calls == []
+        return
+    assert recorded.calls[:3] == ["finish", "changed", "work"]
+    assert recorded.calls.count("changed") == 1
+    assert clock.run_seconds == pytest.approx(passed - clock.seconds["evaluate"], abs=0.02)
+    assert 0.3 * passed < clock.seconds["evaluate"] < 0.6 * passed
