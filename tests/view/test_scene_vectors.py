@@ -41,7 +41,3 @@ def test_paths_are_smooth_and_stay_between_their_key_frames(keys: torch.Tensor) 
 
 def test_a_single_key_frame_stands_still() -> None:
     assert torch.equal(along(OPEN[1:2], 3), OPEN[[1, 1, 1]])
-
-
-def test_two_key_frames_alike_stand_still() -> None:
-    assert torch.equal(along(OPEN[[1, 1]], 3), OPEN[[1, 1, 1]])

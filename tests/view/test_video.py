@@ -213,6 +213,7 @@ def test_pixels_that_a_path_made_nan_come_from_the_other_half(
 )
 def test_mistakes_are_named(
     trained: Path,
+    tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
     options: tuple[str, ...],
@@ -226,9 +227,9 @@ def test_mistakes_are_named(
         ("broken", "[[0, 0, 0]"),
     ):
         (trained / f"{name}.txt").write_text(content)
-    assert video(trained, monkeypatch, "out=wrong.mp4", *options) == 2
+    assert video(trained, monkeypatch, f"out={tmp_path / 'wrong.mp4'}", *options) == 2
     assert message in capsys.readouterr().err
-    assert not list(trained.glob("wrong*"))
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_missing_extra_is_named_before_anything_is_done(
