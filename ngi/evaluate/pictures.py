@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import matplotlib
@@ -24,6 +25,7 @@ PANEL = 256
 """Pixels a triptych's panels are enlarged to, by a whole factor, where they are smaller."""
 
 _MARGIN = 12
+_TOP = 2 * _MARGIN + 14
 _BAR_WIDTH = 14
 
 
@@ -83,22 +85,38 @@ def eight_bit(picture: Tensor) -> np.ndarray:
     return levels
 
 
-def _triptych(pictures: list[Image.Image], labels: tuple[str, ...]) -> Image.Image:
-    """The pictures side by side under their labels, then the error map's colour bar."""
+def side_by_side(
+    pictures: Sequence[Image.Image], labels: Sequence[str], *, room: int = 0
+) -> Image.Image:
+    """The pictures, all of one size, each under its label, and `room` pixels to their right.
+
+    Smaller ones than `PANEL` are enlarged by a whole factor; labels that are too long are cut.
+    """
     factor = max(1, PANEL // pictures[0].height)
     size = (pictures[0].width * factor, pictures[0].height * factor)
-    font = ImageFont.truetype(_font_file(), 15)
-    top = 2 * _MARGIN + 14
-    right = _MARGIN + _BAR_WIDTH + 48
-    sheet = Image.new(
-        "RGB", ((size[0] + _MARGIN) * len(pictures) + right, size[1] + top + _MARGIN), "white"
-    )
+    width = (size[0] + _MARGIN) * len(pictures) + _MARGIN + room
+    sheet = Image.new("RGB", (width, _TOP + size[1] + _MARGIN), "white")
     draw = ImageDraw.Draw(sheet)
+    font = ImageFont.truetype(_font_file(), 15)
     for column, (picture, label) in enumerate(zip(pictures, labels, strict=True)):
         left = _MARGIN + column * (size[0] + _MARGIN)
-        draw.text((left, _MARGIN), label, fill="black", font=font)
-        sheet.paste(picture.resize(size, Image.Resampling.NEAREST), (left, top))
-    _draw_colour_bar(sheet, left=_MARGIN + len(pictures) * (size[0] + _MARGIN), top=top)
+        end = left + size[0] + (room if column == len(pictures) - 1 else 0)
+        draw.text((left, _MARGIN), _cut(label, font, end - left), fill="black", font=font)
+        sheet.paste(picture.resize(size, Image.Resampling.NEAREST), (left, _TOP))
+    return sheet
+
+
+def _cut(label: str, font: ImageFont.FreeTypeFont, width: int) -> str:
+    if font.getlength(label) <= width:
+        return label
+    kept = next(n for n in reversed(range(len(label))) if font.getlength(label[:n] + "…") <= width)
+    return label[:kept] + "…"
+
+
+def _triptych(pictures: Sequence[Image.Image], labels: Sequence[str]) -> Image.Image:
+    """The pictures side by side, then the error map's colour bar."""
+    sheet = side_by_side(pictures, labels, room=_BAR_WIDTH + 48)
+    _draw_colour_bar(sheet, left=sheet.width - _BAR_WIDTH - 48, top=_TOP)
     return sheet
 
 

@@ -80,17 +80,11 @@ def write_picture(options: PictureOptions) -> None:
 
 
 def _scene_vector(options: PictureOptions, renderer: Renderer) -> Tensor:
-    import torch
+    from ngi.view.scene_vectors import given_vector, hard_frame
 
     if options.v is None:
-        frames = renderer.hard_frames()
-        if not 0 <= options.hard_frame < len(frames):
-            raise ValueError(f"hard_frame: {options.hard_frame}; there are 0 to {len(frames) - 1}")
-        return frames[options.hard_frame]
-    v = torch.tensor(options.v)
-    if len(v) != renderer.dimensions or not ((v >= 0) & (v <= 1)).all():
-        raise ValueError(f"v: {options.v}; expected {renderer.dimensions} numbers from 0 to 1")
-    return v
+        return hard_frame(renderer, options.hard_frame)
+    return given_vector(options.v, dimensions=renderer.dimensions, name="v")
 
 
 def _write(path: Path, radiance: Tensor, *, exposure: float) -> None:

@@ -1,0 +1,188 @@
+"""A path through a scene as trained networks show it, as a video: `python -m ngi.video --help`."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+from contextlib import ExitStack, closing
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ngi.options import option, read_options
+
+if TYPE_CHECKING:
+    from ngi.view.film import Film, Measured
+    from ngi.view.trained_run import TrainedRun
+
+
+@dataclass
+class VideoOptions:
+    """Films a path through a scene with a trained network, and measures how steady it is.
+
+    python -m ngi.video run=outputs/demo/sphere-caustic/method=uniform/seed=0 reference=64
+    python -m ngi.video run=FOLDER beside=OTHER path=hard_frames seconds=20
+    python -m ngi.video run=FOLDER path=static hard_frame=3 reference=64
+
+    Beside the MP4 file, a JSON file of the same name says what was measured: along a path that
+    moves, the error of the changes from frame to frame (with a reference); where v stands still,
+    flicker.
+    """
+
+    run: str = option("a run's folder, finished or not")
+    out: str = option("file to write", "video.mp4")
+    path: str = option(
+        "through v: camera (the scene's own), hard_frames, static, or a JSON file with a list of v",
+        "camera",
+    )
+    hard_frame: int = option("of path=static: which one", 0)
+    beside: Any = option("another run's folder of the same scene, or [FOLDER,FOLDER]", None)
+    reference: int = option("samples per pixel, an even number, of path-traced frames beside it", 0)
+    seconds: float = option("how long", 8.0)
+    frames_per_second: int = option("of the video", 24)
+    resolution: int = option("pixels a side", 256)
+    exposure: float = option("stops", 0.0)
+    scene: str | None = option("of a run of the authors' files: their folder", None)
+
+
+def write_video(options: VideoOptions) -> None:
+    """Writes the video and the JSON file.
+
+    Raises ValueError, OSError or RuntimeError, naming key and value, before anything is rendered.
+    """
+    from ngi.view.mp4 import mp4_file, pyav
+
+    pyav()
+    _check(options)
+    out = Path(options.out)
+    with ExitStack() as stack:
+        film = _film(options, stack)
+        with mp4_file(out, frames_per_second=options.frames_per_second) as add_frame:
+            measured = film.shoot(add_frame)
+    _write_json(out.with_suffix(".json"), options, film, measured)
+    steps = ", ".join(f"step {run.step}" for run in film.runs)
+    print(f"{out}: {len(film.path)} frames; {steps}")
+    print(_table(film, measured))
+
+
+def _check(options: VideoOptions) -> None:
+    out = Path(options.out)
+    if out.suffix != ".mp4":
+        raise ValueError(f"out: '{out}' does not end with .mp4")
+    if not out.parent.is_dir():
+        raise ValueError(f"out: there is no folder {out.parent}")
+    if not options.resolution >= 1 or not options.frames_per_second >= 1:
+        raise ValueError("resolution and frames_per_second have to be at least 1")
+    if options.reference < 0 or options.reference % 2:
+        raise ValueError(f"reference: {options.reference}; it has to be an even number, or 0")
+    if not 2 <= options.seconds * options.frames_per_second < float("inf"):
+        raise ValueError(f"seconds: {options.seconds}; a video has two frames at least")
+
+
+def _film(options: VideoOptions, stack: ExitStack) -> Film:
+    """stack: closes the renderers."""
+    from ngi.view.film import Film
+    from ngi.view.scene_vectors import along, key_frames
+    from ngi.view.trained_run import TrainedRun
+
+    scene = None if options.scene is None else Path(options.scene)
+    runs: list[TrainedRun] = []
+    for folder in (Path(options.run), *_beside(options.beside)):
+        if folder.resolve() in (run.folder.resolve() for run in runs):
+            raise ValueError(f"beside: {folder} is there already")
+        run = TrainedRun.open(folder, scene_path=scene)
+        stack.enter_context(closing(run.renderer))
+        if run.renderer.scene_hash != (runs or [run])[0].renderer.scene_hash:
+            raise ValueError(
+                f"beside: {folder} was trained on another scene ('{run.scene_name}') than "
+                f"{options.run} ('{runs[0].scene_name}'), or on another version of it"
+            )
+        runs.append(run)
+    keys = key_frames(options.path, runs[0], still=options.hard_frame)
+    return Film(
+        runs=runs,
+        labels=_labels([run.folder for run in runs]),
+        path=along(keys, round(options.seconds * options.frames_per_second)),
+        resolution=options.resolution,
+        samples=options.reference,
+        exposure=options.exposure,
+    )
+
+
+def _beside(value: Any) -> list[Path]:
+    folders = [] if value is None else value if isinstance(value, list) else [value]
+    if not all(isinstance(folder, str) for folder in folders):
+        raise ValueError(f"beside: {value}; expected a folder or a list of folders")
+    return [Path(folder) for folder in folders]
+
+
+def _labels(folders: Sequence[Path]) -> list[str]:
+    """What tells the folders' names apart: 'uniform' of outputs/demo/…/method=uniform/seed=0."""
+    if len(folders) == 1:
+        return ["network"]
+    names = [folder.resolve().parts for folder in folders]
+    return [
+        "/".join(
+            part.removeprefix("method=")
+            for level, part in enumerate(name)
+            if any(other[level : level + 1] != (part,) for other in names)
+        )
+        or name[-1]
+        for name in names
+    ]
+
+
+def _write_json(file: Path, options: VideoOptions, film: Film, measured: Measured) -> None:
+    from ngi.durable import write_atomically
+    from ngi.provenance import provenance
+
+    first = film.runs[0]
+    content = {
+        **provenance(backend=first.renderer.description),
+        "options": asdict(options),
+        "scene": first.scene_name,
+        "scene_hash": first.renderer.scene_hash,
+        "runs": [
+            {"folder": str(run.folder), "label": label, "step": run.step}
+            for run, label in zip(film.runs, film.labels, strict=True)
+        ],
+        "protocol": asdict(first.protocol),
+        "frames": len(film.path),
+        "measure": "flicker" if film.stands_still else "temporal_error",
+        "definitions": "ngi/evaluate/temporal.py",
+        "measured": measured,
+    }
+    write_atomically(file, json.dumps(content, indent=2).encode())
+
+
+def _table(film: Film, measured: Measured) -> str:
+    from tabulate import tabulate
+
+    if not measured:
+        return "the temporal error needs a reference: reference=64, for example"
+    rows = [
+        (label, *(f"{value:.3g}" for value in values.values()))
+        for label, values in measured.items()
+    ]
+    what = "flicker" if film.stands_still else "temporal error"
+    names = (name.replace("_", " ") for name in next(iter(measured.values())))
+    return tabulate(rows, (what, *names), tablefmt="github", disable_numparse=True)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point of `python -m ngi.video`; 2 where it could not be done, 130 after Ctrl-C."""
+    given = sys.argv[1:] if arguments is None else arguments
+    options = read_options(VideoOptions, "ngi.video", given)
+    try:
+        write_video(options)
+    except (ValueError, OSError, RuntimeError) as error:
+        print(error, file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 130
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
