@@ -2,25 +2,39 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from functools import partial
+
 import torch
+from torch import Tensor
 
 from ngi.benchmark.figures import Figure, figure, in_turn
 from ngi.benchmark.scenes import Scene
-from ngi.models import PixelGenerator
-from ngi.models.patch_linear import PatchLinear
+from ngi.models import ImageLinear, PatchLinear, PixelGenerator
+from ngi.precision import fast_precision
 from ngi.render.mitsuba_renderer import MitsubaRenderer
 
 FEATURES, LAYERS = 512, 8
 """Of the paper's network."""
 RESOLUTIONS = {"cpu": (256,), "cuda": (256, 900)}
-CHUNK = 65_536
-"""Rows of the matrix products that give the machine's rate; pixels of a chunk of the network."""
+WANTED = {("cpu", 256): "≥ 5 with bf16 matrix units", ("cuda", 900): "≥ 60"}
+"""Frames per second in bf16."""
+ROWS, PRODUCTS = 8_192, 8
+"""Of the matrix products that give the machine's rate: their rows stay in its caches."""
 
 
 def inference(
-    scene: Scene, *, repeats: int, features: int = FEATURES, layers: int = LAYERS
+    scene: Scene,
+    *,
+    repeats: int,
+    seconds: float,
+    features: int = FEATURES,
+    layers: int = LAYERS,
 ) -> list[Figure]:
-    """Milliseconds of buffers and network in bf16, v new in each frame, and frames per second."""
+    """Frames per second of buffers, of the network in each precision, and of both; v is always new.
+
+    The network is also compared with plain products of its hidden layers' size, timed in turn.
+    """
     device = "cuda" if torch.cuda.is_available() else "cpu"
     renderer = MitsubaRenderer(scene=scene.read())
     network = PixelGenerator(
@@ -29,21 +43,26 @@ def inference(
         hidden_features=features,
         hidden_layers=layers,
     ).to(device)
-    title = f"{layers}x{features} bf16"
     return [
         figure
         for resolution in RESOLUTIONS[device]
-        for figure in _frames(renderer, network, device, resolution, repeats, title)
+        for figure in _frames(renderer, network, resolution, repeats=repeats, seconds=seconds)
     ]
+
+
+def precisions() -> dict[str, torch.dtype]:
+    """By name; bfloat16 only where the machine does not have to emulate it."""
+    reduced = {"bf16": torch.bfloat16} if fast_precision() == "bf16-mixed" else {}
+    return {**reduced, "fp32": torch.float32}
 
 
 def _frames(
     renderer: MitsubaRenderer,
     network: PixelGenerator,
-    device: str,
     resolution: int,
+    *,
     repeats: int,
-    title: str,
+    seconds: float,
 ) -> list[Figure]:
     generator = torch.Generator().manual_seed(0)
     v = torch.rand(renderer.dimensions, generator=generator)
@@ -53,31 +72,56 @@ def _frames(
         v.copy_(torch.rand(renderer.dimensions, generator=generator))
         buffers.copy_(renderer.image_buffers(v, resolution=resolution))
 
-    def show() -> None:
-        with torch.autocast(device, torch.bfloat16):
-            network.render(buffers.to(device), v.to(device), pixels_per_chunk=CHUNK).cpu()
-
-    features = network.input_layer.out_features
-    left = torch.rand(CHUNK, features, device=device, dtype=torch.bfloat16)
-    right = torch.rand(features, features, device=device, dtype=torch.bfloat16)
-
-    def matrix_product() -> None:
-        left @ right
-
-    of_buffers, of_network, of_product = in_turn(
-        repeats, f"inference, {resolution} pixels", render_buffers, show, matrix_product
-    )
-    operations = 2 * resolution**2 * products_per_pixel(network)
-    rates = [2 * CHUNK * features**2 / t for t in of_product]
-    shares = [100 * operations / t / rate for t, rate in zip(of_network, rates, strict=True)]
-    frames = [1 / (a + b) for a, b in zip(of_buffers, of_network, strict=True)]
+    functions: list[Callable[[], object]] = [render_buffers]
+    for precision in precisions().values():
+        functions += [partial(show, network, buffers, v, precision), products(network, precision)]
+    title = f"inference, {resolution} pixels"
+    of_buffers, *others = in_turn(repeats, title, *functions, seconds=seconds)
     size = f"{resolution} × {resolution}"
-    return [
-        figure(f"buffers, {size}", [1e3 * t for t in of_buffers], "ms"),
-        figure(f"network {title}, {size}", [1e3 * t for t in of_network], "ms"),
-        figure(f"both, {size}", frames, "frames/s"),
-        figure(f"network {title}, {size}, share of the matrix rate", shares, "%"),
-    ]
+    figures = [figure(f"buffers, {size}", _per_second(of_buffers), "frames/s")]
+    for name, of_network, of_products in zip(precisions(), others[::2], others[1::2], strict=True):
+        features, layers = network.input_layer.out_features, len(network.hidden) + 1
+        device = network.input_layer.weight.device.type
+        wanted = WANTED.get((device, resolution), "") if name == "bf16" else ""
+        both = [a + b for a, b in zip(of_buffers, of_network, strict=True)]
+        rates = [2 * PRODUCTS * ROWS * features**2 / t for t in of_products]
+        operations = 2 * resolution**2 * products_per_pixel(network)
+        shares = [100 * operations / t / rate for t, rate in zip(of_network, rates, strict=True)]
+        title = f"network {layers}x{features} {name}, {size}"
+        figures += [
+            figure(title, _per_second(of_network), "frames/s"),
+            figure(f"buffers and {title}", _per_second(both), "frames/s", wanted),
+            figure(f"{title}, share of the matrix rate", shares, "%"),
+            figure(
+                f"matrix rate, {name}, beside {size}", [rate / 1e12 for rate in rates], "TFLOP/s"
+            ),
+        ]
+    return figures
+
+
+def _per_second(seconds: Sequence[float]) -> list[float]:
+    return [1 / t for t in seconds]
+
+
+def show(network: PixelGenerator, buffers: Tensor, v: Tensor, precision: torch.dtype) -> Tensor:
+    """The network's image, [H, W, 3] on the CPU, as a viewer asks for it."""
+    device = network.input_layer.weight.device
+    with torch.autocast(device.type, torch.bfloat16, enabled=precision == torch.bfloat16):
+        return network.render(buffers.to(device), v.to(device)).cpu()
+
+
+def products(network: PixelGenerator, precision: torch.dtype) -> Callable[[], None]:
+    """Products of a hidden layer's features with its weights, and nothing else."""
+    features, device = network.input_layer.out_features, network.input_layer.weight.device
+    rows = torch.rand(ROWS, features, device=device, dtype=precision)
+    weight = torch.rand(features, features, device=device, dtype=precision)
+    layer = ImageLinear(weight, weight[0])
+
+    def multiply() -> None:
+        for _ in range(PRODUCTS):
+            layer(rows)
+
+    return multiply
 
 
 def products_per_pixel(network: PixelGenerator) -> int:

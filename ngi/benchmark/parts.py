@@ -86,8 +86,8 @@ PARTS = (
     ),
     Part(
         "inference",
-        "frames per second of buffers and the paper's network",
-        per_scene(lambda scene, o: inference(scene, repeats=o.repeats)),
+        "frames per second of buffers and the paper's network; its share of the matrix rate",
+        per_scene(lambda scene, o: inference(scene, repeats=o.repeats, seconds=o.seconds)),
         scenes=("sphere-caustic",),
     ),
 )

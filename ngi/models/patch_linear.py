@@ -108,7 +108,7 @@ def _sample_gradients(
     of v, the same at every pixel, an outer product.
     gradient: of the output, [n, p, out_features]; biases: its sum over the pixels
     """
-    parts = [_in_precision(part, gradient.dtype) for part in pixels]
+    parts = [in_precision(part, gradient.dtype) for part in pixels]
     products = gradient.mT @ torch.cat([term for terms in parts for term in terms], dim=-1)
     of_parts = products.split([sum(term.shape[-1] for term in terms) for terms in parts], dim=-1)
     weights = biases.new_empty(*biases.shape, sum(_widths(scene_vector, pixels)))
@@ -130,12 +130,12 @@ def _linear(x: Tensor, weight: Tensor) -> Tensor:
     """Product x · weightᵀ; under autocast, float32 x enters as the sum of two numbers."""
     device = x.device.type
     if torch.is_autocast_enabled(device) and x.dtype == torch.float32:
-        terms = _in_precision(x, torch.get_autocast_dtype(device))
+        terms = in_precision(x, torch.get_autocast_dtype(device))
         return F.linear(torch.cat(terms, dim=-1), torch.cat([weight, weight], dim=1))
     return F.linear(x, weight)
 
 
-def _in_precision(x: Tensor, dtype: torch.dtype) -> list[Tensor]:
+def in_precision(x: Tensor, dtype: torch.dtype) -> list[Tensor]:
     """Tensors of this precision whose sum is x: where x is more precise, two of them."""
     if x.dtype == dtype:
         return [x]

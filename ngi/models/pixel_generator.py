@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
+from ngi.models.image_layers import ImageLinear, layer_inputs
 from ngi.models.patch_linear import PatchLinear
 from ngi.patches import BufferLayout
 
 RADIANCE_CHANNELS = 3
 EMITTER_THRESHOLD = 1.0
 """log1p of emitted radiance above which a pixel shows the emitter and nothing else."""
+CACHED_PIXELS = 8_192
+"""Rendered at a time on a CPU: the features of so many stay in its caches."""
+MANY_PIXELS = 65_536
+"""Rendered at a time on a GPU."""
 
 
 class PixelGenerator(nn.Module):
@@ -104,17 +111,46 @@ class PixelGenerator(nn.Module):
 
     @torch.no_grad()
     def render(
-        self, buffers: Tensor, scene_vector: Tensor, pixels_per_chunk: int = 65_536
+        self, buffers: Tensor, scene_vector: Tensor, pixels_per_chunk: int | None = None
     ) -> Tensor:
         """A whole image, [H, W, C] and v [D] to log1p radiance [H, W, 3], in chunks of pixels.
 
-        The chunks bound the memory and do not change the result. Keeps no gradient.
+        The same as `forward` up to rounding, which under bfloat16 happens less often here (see
+        `ImageLinear`). The chunks bound the memory and do not change the result. Keeps no gradient.
+
+        pixels_per_chunk: None for as many as are fastest
         """
-        if pixels_per_chunk < 1:
+        if pixels_per_chunk is not None and pixels_per_chunk < 1:
             raise ValueError(f"pixels_per_chunk is {pixels_per_chunk}: it must be at least 1")
-        chunks = buffers.flatten(0, 1).split(pixels_per_chunk)
-        output = torch.cat([self(c[None, :, None], scene_vector[None])[0, :, 0] for c in chunks])
-        return output.unflatten(0, buffers.shape[:2])
+        self._check(buffers[None], scene_vector[None])
+        device = buffers.device.type
+        precision = self.input_layer.weight.dtype
+        if torch.is_autocast_enabled(device) and precision == torch.float32:
+            precision = torch.get_autocast_dtype(device)
+        size = pixels_per_chunk or (CACHED_PIXELS if device == "cpu" else MANY_PIXELS)
+        with torch.autocast(device, enabled=False):
+            layers = [
+                ImageLinear.of(layer, scene_vector, precision)
+                for layer in self.modules()
+                if isinstance(layer, PatchLinear)
+            ]
+            chunks = buffers.flatten(0, 1).split(size)
+            output = torch.cat([self._render_pixels(chunk, layers) for chunk in chunks])
+        output = output.to(buffers.dtype).unflatten(0, buffers.shape[:2])
+        return self._pass_emission_through(output, buffers)
+
+    def _render_pixels(self, pixels: Tensor, layers: Sequence[ImageLinear]) -> Tensor:
+        """Buffers [p, C] to the last layer's output [p, 3]."""
+        first, *hidden, last = layers
+        precision = first.weight.dtype
+        inputs = layer_inputs(pixels[:, : self.layout.input_channels], precision)
+        seen_first = inputs
+        if self.position_preconditioning:
+            seen_first = layer_inputs(pixels[:, self.layout.slice("position")], precision)
+        features = first(seen_first, negative_slope=self.negative_slope)
+        for layer in hidden:
+            features = layer(features, inputs, negative_slope=self.negative_slope)
+        return last(features, inputs)
 
     def _first_layer(self, pixels: Tensor, inputs: Tensor, scene_vector: Tensor) -> Tensor:
         if not self.position_preconditioning:

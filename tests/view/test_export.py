@@ -1,0 +1,213 @@
+"""`python -m ngi.export` on runs of closed formulas; ONNX Runtime is the independent judge."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from ngi.models import PixelGenerator
+from ngi.patches import BUFFER_CHANNELS, CHAIN_CHANNELS
+from ngi.scene import read_scene, scenes
+from ngi.view import export
+from ngi.view.network_metadata import BUFFERS, scene_metadata
+from ngi.view.trained_run import TrainedRun
+from tests.learn.command_line import run
+
+onnx = pytest.importorskip("onnx", reason="the extra 'export' is missing")
+
+EMBEDDER = """
+import json, sys
+sys.modules["ngi"] = sys.modules["torch"] = None
+import numpy, onnxruntime
+session = onnxruntime.InferenceSession("network.onnx")
+given = numpy.load("inputs.npz")
+for name in ("one", "many"):
+    inputs = {"buffers": given[name], "v": given["v"]}
+    numpy.save(name, session.run(["radiance"], inputs)[0])
+print(json.dumps(session.get_modelmeta().custom_metadata_map))
+"""
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("trained")
+    status, output = run(folder, "run.folder=run")
+    assert status == 0, output
+    return folder
+
+
+@pytest.fixture(scope="module")
+def exported(trained: Path) -> Path:
+    arguments = [f"run={trained / 'run'}", f"out={trained / 'network.onnx'}"]
+    assert export.main(arguments) == 0
+    return trained / "network.onnx"
+
+
+@pytest.fixture(scope="module")
+def opened(trained: Path) -> TrainedRun:
+    return TrainedRun.open(trained / "run")
+
+
+@pytest.fixture(scope="module")
+def embedded(exported: Path, opened: TrainedRun) -> dict[str, Any]:
+    """What a program that knows neither ngi nor PyTorch makes of the file."""
+    generator = torch.Generator().manual_seed(1)
+    C, D = opened.renderer.layout.channels, opened.renderer.dimensions
+    inputs = {
+        "one": torch.rand(1, C, generator=generator),
+        "many": 4 * torch.rand(777, C, generator=generator) - 2,
+        "v": torch.rand(D, generator=generator),
+    }
+    np.savez(exported.parent / "inputs.npz", **{k: x.numpy() for k, x in inputs.items()})
+    done = subprocess.run(
+        [sys.executable, "-I", "-c", EMBEDDER],
+        capture_output=True,
+        text=True,
+        cwd=exported.parent,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stderr
+    outputs = {name: np.load(exported.parent / f"{name}.npy") for name in ("one", "many")}
+    return {"inputs": inputs, "outputs": outputs, "metadata": json.loads(done.stdout)}
+
+
+@pytest.mark.parametrize("name", ["one", "many"])
+def test_a_program_without_this_one_gets_linear_radiance(
+    embedded: dict[str, Any], opened: TrainedRun, name: str
+) -> None:
+    buffers, v = embedded["inputs"][name], embedded["inputs"]["v"]
+    network = PixelGenerator(
+        layout=opened.network.layout,
+        scene_dimensions=len(v),
+        hidden_features=opened.network.input_layer.out_features,
+        hidden_layers=len(opened.network.hidden) + 1,
+    ).double()
+    network.load_state_dict(opened.network.state_dict())
+    with torch.no_grad():
+        log_radiance = network(buffers[None, None].double(), v[None].double())[0, 0]
+    expected = log_radiance.exp() - 1
+    np.testing.assert_allclose(embedded["outputs"][name], expected, rtol=1e-5, atol=1e-5)
+    assert name == "one" or (expected < 0).any()
+
+
+def test_the_file_says_what_its_inputs_are(
+    embedded: dict[str, Any], opened: TrainedRun, trained: Path
+) -> None:
+    told = embedded["metadata"]
+    settings = json.loads((trained / "run" / "settings.json").read_text())
+    assert {"name": told["scene"], "hash": told["scene_hash"]} == settings["scene"]
+    assert told["step"] == "12" == str(opened.step)
+    assert told["precision"] == "float32; trained as 32-true"
+    assert "commit" in told
+    buffers = [(b["name"], b["first"], b["channels"]) for b in json.loads(told["buffers"])]
+    assert buffers == [
+        ("position", 0, 3),
+        ("normal", 3, 3),
+        ("outgoing", 6, 3),
+        ("albedo", 9, 3),
+        ("roughness", 12, 1),
+        ("emission", 13, 3),
+    ]
+    assert BUFFERS.keys() == BUFFER_CHANNELS.keys() | CHAIN_CHANNELS.keys()
+
+
+def test_it_tells_no_path_of_this_machine(exported: Path) -> None:
+    content = exported.read_bytes()
+    for folder in (Path(torch.__file__).parents[1], Path(export.__file__).parents[1]):
+        assert str(folder).encode() not in content
+    assert b".py" not in content
+
+
+def test_v_enters_once_per_image(exported: Path, opened: TrainedRun) -> None:
+    graph = onnx.shape_inference.infer_shapes(onnx.load(exported)).graph
+    shapes = {
+        info.name: [dim.dim_value for dim in info.type.tensor_type.shape.dim]
+        for info in graph.value_info
+    }
+    of_v, products = {"v"}, []
+    for node in graph.node:
+        if node.op_type in ("Gemm", "MatMul") and of_v & {*node.input}:
+            products.append(shapes[node.output[0]])
+        elif of_v & {*node.input}:
+            of_v |= {*node.output}
+    hidden = [[1, layer.out_features] for layer in opened.network.hidden]
+    assert products[-len(hidden) - 1 :] == [*hidden, [1, 3]]  # the first layer does not see it
+
+
+def ranged(entry: dict[str, Any], u: Iterator[float]) -> list[float]:
+    """The value that the file's `v` says a variable has."""
+    if "choices" in entry:
+        n = len(entry["choices"])
+        return [min(np.floor(n * next(u)), n - 1)]
+    linked = next(u) if entry["linked"] and entry["minimum"] != entry["maximum"] else None
+    return [
+        low if low == high else low + (linked if linked is not None else next(u)) * (high - low)
+        for low, high in zip(entry["minimum"], entry["maximum"], strict=True)
+    ]
+
+
+@pytest.mark.parametrize("scene", ["sphere-caustic", "living-room", "veach-door", "chess"])
+def test_the_variables_can_be_set_by_what_it_says(scene: str) -> None:
+    description = read_scene(**scenes()[scene])
+    told = scene_metadata(description)
+    variables = json.loads(told["variables"])
+    assert [name for entry in variables for name in entry["components"]] == [
+        *description.component_names
+    ]
+    bounds = json.loads(told["bounds"])
+    assert (bounds["minimum"], bounds["maximum"]) == tuple(map(list, description.bounds))
+    v = np.random.default_rng(0).random(description.dimensions)
+    u = iter(v)
+    for entry, value in zip(variables, description.values(v), strict=True):
+        np.testing.assert_allclose(ranged(entry, u), value)
+
+
+def test_a_file_that_differs_is_not_written(
+    trained: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(export, "TOLERANCE", 1e-12)
+    out = trained / "refused.onnx"
+    assert export.main([f"run={trained / 'run'}", f"out={out}"]) == 2
+    assert "differs from the one of the run by" in capsys.readouterr().err
+    assert not list(trained.glob("refused*"))
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("run=elsewhere",), "elsewhere/settings.json: no such file"),
+        (("run=run", "out=network.pt2"), "'network.pt2' does not end with .onnx"),
+        (("run=run", "out=nowhere/network.onnx"), "no folder nowhere"),
+        (("out=network.onnx",), "give run="),
+        (("run=run", "colour=red"), "'colour' is no option"),
+    ],
+)
+def test_mistakes_are_named(
+    trained: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    options: tuple[str, ...],
+    message: str,
+) -> None:
+    monkeypatch.chdir(trained)
+    try:
+        status: Any = export.main(options)
+    except SystemExit as ended:
+        status = ended.code
+    assert status == 2
+    assert message in capsys.readouterr().err
+
+
+def test_a_missing_extra_is_named(
+    trained: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(trained)
+    monkeypatch.setattr(export, "PACKAGES", ("onnx", "no_such_package"))
+    assert export.main(["run=run"]) == 2
+    assert "no_such_package missing: pip install -e .[export]" in capsys.readouterr().err
