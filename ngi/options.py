@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import MISSING, Field, field, fields
 from typing import Any, NoReturn, TypeVar, cast
 
@@ -42,6 +42,28 @@ def read_options(kind: type[Options], program: str, arguments: Sequence[str]) ->
         return cast("Options", OmegaConf.to_object(values))
     except OmegaConfBaseException as error:
         _refuse(program, f"{error.full_key}: {str(error).splitlines()[0]}")
+
+
+def run_tool(
+    work: Callable[[Options], None],
+    kind: type[Options],
+    program: str,
+    arguments: Sequence[str] | None = None,
+) -> int:
+    """Does what `python -m PROGRAM key=value …` asks for, and returns its exit status.
+
+    kind: of the options, see `read_options`; arguments: those of the command line where None
+    0; 2 where `work` raised ValueError, OSError or RuntimeError, which is printed; Ctrl-C: 130.
+    """
+    options = read_options(kind, program, sys.argv[1:] if arguments is None else arguments)
+    try:
+        work(options)
+    except (ValueError, OSError, RuntimeError) as error:
+        print(error, file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 130
+    return 0
 
 
 def _refuse(program: str, problem: str) -> NoReturn:

@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ngi.options import option, read_options
+from ngi.options import option, run_tool
 
 if TYPE_CHECKING:
     from ngi.view.film import Film, Measured
@@ -171,17 +171,8 @@ def _table(film: Film, measured: Measured) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point of `python -m ngi.video`; 2 where it could not be done, 130 after Ctrl-C."""
-    given = sys.argv[1:] if arguments is None else arguments
-    options = read_options(VideoOptions, "ngi.video", given)
-    try:
-        write_video(options)
-    except (ValueError, OSError, RuntimeError) as error:
-        print(error, file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        return 130
-    return 0
+    """Entry point of `python -m ngi.video`."""
+    return run_tool(write_video, VideoOptions, "ngi.video", arguments)
 
 
 if __name__ == "__main__":

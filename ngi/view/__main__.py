@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from contextlib import closing, suppress
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-from ngi.options import option, read_options
+from ngi.options import option, run_tool
 
 POLL = 0.5
 """Seconds to wait for something to do, after which Ctrl-C is looked at."""
@@ -69,11 +69,7 @@ def view(options: ViewOptions) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point of `python -m ngi.view`."""
-    given = sys.argv[1:] if arguments is None else arguments
-    options = read_options(ViewOptions, "ngi.view", given)
-    with suppress(KeyboardInterrupt):
-        view(options)
-    return 0
+    return run_tool(view, ViewOptions, "ngi.view", arguments)
 
 
 if __name__ == "__main__":

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
@@ -10,7 +9,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ngi.options import option, read_options
+from ngi.options import option, run_tool
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -100,12 +99,5 @@ def _inputs(run: TrainedRun) -> dict[str, tuple[Tensor, Tensor]]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point of `python -m ngi.export`; 2 where it could not be done."""
-    given = sys.argv[1:] if arguments is None else arguments
-    options = read_options(ExportOptions, "ngi.export", given)
-    try:
-        export(options)
-    except (ValueError, OSError, RuntimeError) as error:
-        print(error, file=sys.stderr)
-        return 2
-    return 0
+    """Entry point of `python -m ngi.export`."""
+    return run_tool(export, ExportOptions, "ngi.export", arguments)

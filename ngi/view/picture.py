@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
@@ -11,7 +10,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from ngi.options import option, read_options
+from ngi.options import option, run_tool
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -102,12 +101,5 @@ def _beside(path: Path, what: str) -> Path:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point of `python -m ngi.render`; 2 where it could not be done."""
-    given = sys.argv[1:] if arguments is None else arguments
-    options = read_options(PictureOptions, "ngi.render", given)
-    try:
-        write_picture(options)
-    except (ValueError, OSError, RuntimeError) as error:
-        print(error, file=sys.stderr)
-        return 2
-    return 0
+    """Entry point of `python -m ngi.render`."""
+    return run_tool(write_picture, PictureOptions, "ngi.render", arguments)
