@@ -21,14 +21,17 @@ class ImageMetrics(TypedDict):
 
 
 def image_metrics(
-    prediction: Tensor, reference: Tensor, *, protocol: EvaluationProtocol, lpips: Lpips
+    prediction: Tensor, reference: Tensor, *, protocol: EvaluationProtocol, lpips: Lpips | None
 ) -> ImageMetrics:
-    """prediction, reference: [H, W, 3] linear radiance, at least as large as SSIM's window."""
+    """prediction, reference: [H, W, 3] linear radiance, at least as large as SSIM's window.
+
+    lpips: None where its time is not worth it
+    """
     picture = tone_map(prediction, protocol.exposure)
     wanted = tone_map(reference, protocol.exposure)
     return ImageMetrics(
         mape=mape(prediction, reference, protocol.epsilon),
         dssim=dssim(picture, wanted, window=protocol.ssim_window, sigma=protocol.ssim_sigma),
         mae=mae(prediction, reference),
-        lpips=lpips(picture, wanted) if lpips.available else None,
+        lpips=lpips(picture, wanted) if lpips is not None and lpips.available else None,
     )

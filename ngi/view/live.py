@@ -71,9 +71,12 @@ class LiveView(Callback):
         begin = monotonic()
         if begin < self._free_from or not self._page.visitors:
             return
+        due = begin >= self._refresh_from
+        if not (due or self._studio.waiting):
+            return
         self._stream.finish_rendering()
         with self._clock.phase("evaluate"):
-            if begin >= self._refresh_from:
+            if due:
                 self._studio.network_changed()
                 self._refresh()
                 self._refresh_from = monotonic() + REFRESH

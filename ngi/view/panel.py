@@ -11,6 +11,7 @@ from typing import Any
 
 import viser
 
+from ngi.scene.kinds import Visibility
 from ngi.view.controls import Control
 from ngi.view.screen import PARTS, Screen
 from ngi.view.tone import CURVES
@@ -132,7 +133,7 @@ class Panel:
 
     def _add(self, control: Control) -> None:
         component = self._v[control.component]
-        if control.choices == ("hidden", "visible"):
+        if control.choices == Visibility.choices:
             made: Any = self._gui.add_checkbox(
                 control.name, control.choice(component) == control.choices[1]
             )

@@ -77,6 +77,12 @@ class Studio:
             for session, _ in self._sessions.values():
                 session.again()
 
+    @property
+    def waiting(self) -> bool:
+        """Whether some browser wants a picture that is not made yet."""
+        with self._changed:
+            return self._next() is not None
+
     def work(self, *, wait: float) -> bool:
         """Makes one picture; False where for `wait` seconds there was none to make."""
         deadline = monotonic() + wait

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import torch
-from hydra.utils import get_object, instantiate
+from hydra.utils import get_object
 from omegaconf import DictConfig, OmegaConf
 from torch import Tensor
 
@@ -17,6 +18,7 @@ from ngi.evaluate import EvaluationProtocol
 from ngi.learn import read_checkpoint
 from ngi.models import PixelGenerator
 from ngi.render import Renderer
+from ngi.render.workers import mitsuba_renderer
 from ngi.resources import root
 from ngi.scene import SceneDescription, read_scene, scenes
 from ngi.scene.release import read_release
@@ -58,8 +60,10 @@ class TrainedRun:
         checkpoint = _newest(folder)
         description = _description(settings, scene_path)
         renderer = _renderer(folder, settings, description)
-        network = instantiate(settings["model"])(
-            layout=renderer.layout, scene_dimensions=renderer.dimensions
+        network = _made_by(settings, "model")(
+            **_plain(settings["model"]),
+            layout=renderer.layout,
+            scene_dimensions=renderer.dimensions,
         )
         weights = {
             name.removeprefix(NETWORK): value
@@ -73,7 +77,7 @@ class TrainedRun:
             scene_name=settings["scene"]["name"],
             step=checkpoint["global_step"],
             precision=settings["trainer"]["precision"],
-            protocol=instantiate(settings["evaluation"]["evaluator"]["protocol"]),
+            protocol=EvaluationProtocol(**_plain(settings["evaluation"]["evaluator"]["protocol"])),
             description=description,
             renderer=renderer,
             network=network.to(device).eval(),
@@ -121,12 +125,31 @@ def _newest(folder: Path) -> dict[str, Any]:
     raise FileNotFoundError(f"{folder}: no checkpoint yet; a run writes one every minute or so")
 
 
+def _made_by(settings: dict[str, Any], group: str) -> Callable[..., Any]:
+    """What makes a part of the run: the `_target_` of one of the group's options in conf/.
+
+    A run's folder may be somebody else's, and a `_target_` can name any function there is.
+    """
+    target = settings[group]["_target_"]
+    options = [OmegaConf.load(file) for file in (root() / "conf" / group).glob("*.yaml")]
+    known = {option.get("_target_") for option in options if isinstance(option, DictConfig)}
+    if not isinstance(target, str) or target not in known:
+        raise ValueError(
+            f"settings.json: {group}._target_ is '{target}', which no option of the group {group} "
+            "names; only what comes with this program is opened"
+        )
+    return get_object(target)
+
+
+def _plain(arguments: dict[str, Any]) -> dict[str, Any]:
+    """Without Hydra's own keys."""
+    return {name: value for name, value in arguments.items() if not name.startswith("_")}
+
+
 def _description(settings: dict[str, Any], path: Path | None) -> SceneDescription | None:
     """What varies in the run's scene; None where it is made of closed formulas."""
     name = settings["scene"]["name"]
-    mitsuba = OmegaConf.load(root() / "conf" / "renderer" / "mitsuba.yaml")
-    assert isinstance(mitsuba, DictConfig)
-    if settings["renderer"]["_target_"] != mitsuba["_target_"]:
+    if _made_by(settings, "renderer") is not mitsuba_renderer:
         return None
     if path is not None:
         return read_release(path)
@@ -142,11 +165,10 @@ def _renderer(
     folder: Path, settings: dict[str, Any], description: SceneDescription | None
 ) -> Renderer:
     """Of the scene as the run was trained on it, in this process, on whatever it has."""
-    options = dict(settings["renderer"])
-    make = get_object(options.pop("_target_"))
+    options = _plain(settings["renderer"])
     if description is not None:
         options |= {"backend": "auto", "scene": description, "workers": 0, "cluster": None}
-    renderer: Renderer = make(**options)
+    renderer: Renderer = _made_by(settings, "renderer")(**options)
     if renderer.scene_hash != settings["scene"]["hash"]:
         raise ValueError(
             f"{folder} was trained on '{settings['scene']['name']}' as it was then; the scene has "

@@ -14,7 +14,7 @@ import numpy as np
 import viser
 from PIL import Image
 
-from ngi.evaluate import dssim, mae, mape, tone_map
+from ngi.evaluate import image_metrics
 from ngi.render.exr import write_exr
 from ngi.view.panel import Panel
 from ngi.view.scene_view import Place
@@ -135,15 +135,15 @@ class Visitor:
         return (len(recent) - 1) / (recent[-1] - recent[0])
 
     def _metrics(self, shown: Shown) -> str:
-        protocol = self._subject.protocol
-        prediction, reference = shown.view.prediction, shown.view.reference
-        picture, wanted = (tone_map(image, protocol.exposure) for image in (prediction, reference))
-        metrics = {
-            "MAPE": mape(prediction, reference, protocol.epsilon),
-            "DSSIM": dssim(picture, wanted, window=protocol.ssim_window, sigma=protocol.ssim_sigma),
-            "MAE": mae(prediction, reference),
-        }
-        return ", ".join(f"{name} {value:.3g}" for name, value in metrics.items())
+        measured = image_metrics(
+            shown.view.prediction,
+            shown.view.reference,
+            protocol=self._subject.protocol,
+            lpips=None,
+        )
+        return ", ".join(
+            f"{name.upper()} {value:.3g}" for name, value in measured.items() if value is not None
+        )
 
     def _add_files(self) -> None:
         gui, client = self._client.gui, self._client

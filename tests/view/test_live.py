@@ -55,14 +55,18 @@ def test_every_part_of_the_figure_shows_its_data() -> None:
 
 def test_a_run_that_has_just_begun_has_a_figure_too() -> None:
     empty = torch.empty(0, 4)
-    figure(
+    begun = figure(
         evaluations=pd.DataFrame(),
         steps=pd.DataFrame(),
         visited=Visited(empty, torch.empty(0), torch.zeros(16, 4)),
         patches=torch.empty(0, 16, 16, 3),
         losses=[],
     )
-    figure(visited=Visited(torch.rand(5, 4), torch.full((5,), torch.nan), torch.zeros(16, 4)))
+    unscored = figure(
+        visited=Visited(torch.rand(5, 4), torch.full((5,), torch.nan), torch.zeros(16, 4))
+    )
+    assert begun.shape == unscored.shape == figure().shape
+    assert (begun != unscored).any()
 
 
 def test_a_run_with_a_page_trains_as_one_without(tmp_path: Path) -> None:
@@ -88,6 +92,7 @@ class Recorded:
 
     def __init__(self, *, visitors: int) -> None:
         self.visitors = visitors
+        self.waiting = True
         self.calls: list[str] = []
         self.gui = self.chains = self.store = None
         self.chain_record = None

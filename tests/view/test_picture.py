@@ -1,6 +1,7 @@
 """`python -m ngi.render` on runs of closed formulas, as a user starts it."""
 
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -131,3 +132,27 @@ def test_a_scene_that_changed_or_is_unknown_is_refused(trained: Path, tmp_path: 
         status, output = render(folder)
         assert status == 2
         assert message in output
+
+
+@pytest.mark.parametrize(
+    ("group", "target"),
+    [
+        ("model", "os.system"),
+        ("model", "ngi.train.os.system"),
+        ("renderer", "subprocess.check_output"),
+        ("renderer", "ngi.durable.write_atomically"),
+    ],
+)
+def test_a_folder_of_somebody_else_executes_nothing(
+    trained: Path, tmp_path: Path, group: str, target: str
+) -> None:
+    shutil.copytree(trained / "run", tmp_path / "run")
+    path = tmp_path / "run" / "settings.json"
+    settings = json.loads(path.read_text())
+    command = "touch was_here"
+    settings[group] = {"_target_": target, "command": command, "args": command, "path": "was_here"}
+    path.write_text(json.dumps(settings))
+    status, output = render(tmp_path)
+    assert status == 2
+    assert f"{group}._target_ is '{target}'" in output
+    assert not (tmp_path / "was_here").exists()

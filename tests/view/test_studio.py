@@ -37,7 +37,9 @@ def test_the_picture_is_the_one_computed_without_a_viewer() -> None:
     pictures: list[Shown] = []
     studio = Studio(renderer=renderer(), predict=predict)
     studio.open("a", Wish(Place(V, 40), Screen(exposure=1.0)), pictures.append)
+    assert studio.waiting
     assert studio.work(wait=0)
+    assert not studio.waiting
     assert not studio.work(wait=0)
     v = torch.tensor(V)
     expected = torch.expm1(predict(renderer().image_buffers(v, resolution=40), v))
