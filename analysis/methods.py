@@ -20,6 +20,7 @@ TITLES = {
     "constant_resolution": "exploration at constant resolution",
     "uniform_growing": "uniform sampling with growing resolution",
     "traced_specular": "traced specular bounces",
+    "cnsr": "CNSR",
 }
 """What tables and pictures call the options of the configuration group `method`, in order."""
 

@@ -10,10 +10,12 @@ from ngi.learn.datamodule import ExplorationDataModule
 from ngi.learn.interruption import Interrupted, Interruption
 from ngi.learn.model_clock import ModelClock
 from ngi.learn.module import IlluminationModule, seeded
+from ngi.learn.observation_sets import ObservationSets
 from ngi.learn.record_log import RecordLog
 from ngi.learn.recorder import Recorder
 from ngi.learn.row_log import RowLog
 from ngi.learn.run_folder import RunFolder
+from ngi.learn.samples import Example, PatchSamples, Samples
 from ngi.learn.scorer import Scorer
 from ngi.learn.step_guard import LARGEST_NORM, StepGuard, gradient_norm
 from ngi.learn.stream import TrainingStream
@@ -30,6 +32,7 @@ __all__ = [
     "CostFile",
     "Costs",
     "Counters",
+    "Example",
     "ExplorationDataModule",
     "Feedback",
     "IlluminationModule",
@@ -37,7 +40,9 @@ __all__ = [
     "Interruption",
     "Local",
     "ModelClock",
+    "ObservationSets",
     "PatchArchive",
+    "PatchSamples",
     "PhaseClock",
     "RecordLog",
     "Recorder",
@@ -45,6 +50,7 @@ __all__ = [
     "RunClock",
     "RunFolder",
     "SamplerFeedback",
+    "Samples",
     "Scorer",
     "StepGuard",
     "TargetMap",

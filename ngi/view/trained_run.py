@@ -11,12 +11,11 @@ from typing import Any
 import torch
 from hydra.utils import get_object
 from omegaconf import DictConfig, OmegaConf
-from torch import Tensor
+from torch import Tensor, nn
 
 from ngi.durable import DamagedError
 from ngi.evaluate import EvaluationProtocol
-from ngi.learn import read_checkpoint
-from ngi.models import PixelGenerator
+from ngi.learn import PatchSamples, Samples, read_checkpoint
 from ngi.render import Renderer
 from ngi.render.workers import mitsuba_renderer
 from ngi.resources import root
@@ -36,6 +35,7 @@ class TrainedRun:
     precision: as Lightning names that of training, which is that of `predict` too
     protocol: that its evaluations measured by
     description: of its scene; None for closed formulas
+    samples: what the network was trained on, which says what it is given
     """
 
     folder: Path
@@ -45,7 +45,8 @@ class TrainedRun:
     protocol: EvaluationProtocol
     description: SceneDescription | None
     renderer: Renderer
-    network: PixelGenerator
+    samples: Samples
+    network: nn.Module
 
     @classmethod
     def open(cls, folder: Path, *, scene_path: Path | None = None) -> TrainedRun:
@@ -60,10 +61,11 @@ class TrainedRun:
         checkpoint = _newest(folder)
         description = _description(settings, scene_path)
         renderer = _renderer(folder, settings, description)
+        samples = _samples(settings, renderer)
         network = _made_by(settings, "model")(
             **_plain(settings["model"]),
-            layout=renderer.layout,
-            scene_dimensions=renderer.dimensions,
+            layout=samples.layout,
+            scene_dimensions=samples.dimensions,
         )
         weights = {
             name.removeprefix(NETWORK): value
@@ -80,6 +82,7 @@ class TrainedRun:
             protocol=EvaluationProtocol(**_plain(settings["evaluation"]["evaluator"]["protocol"])),
             description=description,
             renderer=renderer,
+            samples=samples,
             network=network.to(device).eval(),
         )
 
@@ -87,8 +90,10 @@ class TrainedRun:
         """Buffers [H, W, C] and v [D] in [0, 1] to log1p of linear RGB [H, W, 3], on the CPU."""
         device = next(self.network.parameters()).device
         reduced = self.precision == "bf16-mixed"
+        inputs = self.samples.test_inputs(scene_vector, resolution=len(buffers))
+        on_device = (tensor.to(device) for tensor in (buffers, *inputs))
         with torch.autocast(device.type, dtype=torch.bfloat16, enabled=reduced):
-            output = self.network.render(buffers.to(device), scene_vector.to(device))
+            output: Tensor = self.network.render(*on_device)  # type: ignore[operator]
         return output.float().cpu()
 
     def radiance(self, scene_vector: Tensor, *, resolution: int) -> Tensor:
@@ -139,6 +144,14 @@ def _made_by(settings: dict[str, Any], group: str) -> Callable[..., Any]:
             "names; only what comes with this program is opened"
         )
     return get_object(target)
+
+
+def _samples(settings: dict[str, Any], renderer: Renderer) -> Samples:
+    """Runs of before there was a group `data` were trained on patches."""
+    if "data" not in settings:
+        return PatchSamples(renderer=renderer)
+    samples: Samples = _made_by(settings, "data")(**_plain(settings["data"]), renderer=renderer)
+    return samples
 
 
 def _plain(arguments: dict[str, Any]) -> dict[str, Any]:
