@@ -72,6 +72,11 @@ class Counters:
     steps_refused: int = 0
     steps_scaled: int = 0
 
+    @property
+    def proposed_batches(self) -> int:
+        """How often the chains' proposals were rendered, or refused, so far."""
+        return self.generated_batches + self.batches_refused
+
     def count_generated(self, rendered: RenderedPatches) -> None:
         """Adds one generated batch."""
         self.generated_batches += 1

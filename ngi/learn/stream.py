@@ -217,7 +217,9 @@ class TrainingStream(IterableDataset[Batch]):
         if self._ahead is None:
             with self._clock.phase("explore"):
                 self._ahead = ProposalsAhead(
-                    self.sampler.propose(self._chains, self._generator),
+                    self.sampler.propose(
+                        self._chains, self._generator, batch=self.counters.proposed_batches
+                    ),
                     resolution=self._schedule.resolution(self.counters.iteration),
                     seed=int(torch.randint(2**31, (), generator=self._generator)),
                 )
