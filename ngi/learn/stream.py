@@ -206,7 +206,13 @@ class TrainingStream(IterableDataset[Batch]):
             draw = torch.rand((), generator=self._generator, dtype=torch.float64)
             if draw < self.reuse_probability or self._postpone(ahead):
                 ids = self.store.draw(self.sampler.chains, self._generator)
-                return Batch(self.store.get(ids), ids, generated=False, current=None)
+                return Batch(
+                    self.store.get(ids),
+                    ids,
+                    generated=False,
+                    current=None,
+                    loss_weights=self.store.loss_weights(ids),
+                )
         return self._generate(ahead)
 
     def _propose(self) -> ProposalsAhead:
