@@ -21,9 +21,9 @@ class Sobol:
     (Matousek 1998), as PyTorch does it. Which points a batch gets depends on its number alone, so
     that there is no place in the sequence that a checkpoint would have to hold.
 
-    seed: of the scrambling. It is not PyTorch's seed: of the same one the sequence of the test
-        frames (`ngi.evaluate.evaluation_frames`) begins with the same point, though it has other
-        dimensions, and a run would be trained on its first test frame.
+    seed: the run's. The scrambling is seeded with a number drawn from it: seeded with the same one,
+        PyTorch's sequences of all dimensions begin with the same point, and the run whose seed is
+        that of the test frames (`ngi.evaluate.evaluation_frames`) would be trained on the first.
     """
 
     starts_chains = True
@@ -31,7 +31,7 @@ class Sobol:
     def __init__(self, *, seed: int) -> None:
         generator = torch.Generator().manual_seed(seed)
         self._seed = int(torch.randint(2**31, (), generator=generator))
-        self._engine: SobolEngine | None = None  # to make one for 5,000 dimensions takes a second
+        self._engine: SobolEngine | None = None  # kept to save time, nothing else
 
     def propose(self, position: Tensor, generator: torch.Generator, *, batch: int) -> Proposals:
         """See `ProposalDistribution.propose`; nothing is drawn from `generator`.
@@ -59,9 +59,9 @@ class Sobol:
 class LatinHypercube:
     """n points of which every variable has one in each of n equal intervals (McKay et al. 1979).
 
-    Each batch is such a set by itself. A set of all patches of a run would be spread more evenly
-    still, but how many these are is known at its end only, and of a set that is not used up nothing
-    is known; any number of whole batches has equally many points in each of the n intervals.
+    Each batch is such a set by itself. One set of all patches of a run would be spread more evenly
+    still, but how many they are is known at its end only, and part of a set promises nothing; any
+    number of batches has equally many points in each of the n intervals.
     """
 
     starts_chains = True
