@@ -20,6 +20,10 @@ TITLES = {
     "constant_resolution": "exploration at constant resolution",
     "uniform_growing": "uniform sampling with growing resolution",
     "traced_specular": "traced specular bounces",
+    "sobol": "a Sobol sequence",
+    "latin_hypercube": "Latin hypercubes",
+    "fixed_data": "a fixed data set",
+    "prioritised_replay": "prioritised replay",
     "cnsr": "CNSR",
 }
 """What tables and pictures call the options of the configuration group `method`, in order."""

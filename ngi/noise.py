@@ -85,18 +85,23 @@ def _states(config: DictConfig, stream: dict[str, object]) -> tuple[dict[str, Te
     import torch
 
     from ngi.explore import ChainState
+    from ngi.learn.batch import Counters
 
     sampler, generator = instantiate(config.sampler), torch.Generator().manual_seed(config.seed)
     chains = ChainState.from_state_dict(stream["chains"])  # type: ignore[arg-type]
-    proposals = [sampler.propose(chains, generator).position for _ in range(ROUNDS)]
+    counters = Counters(**stream["counters"])  # type: ignore[arg-type]
+    first = counters.proposed_batches
+    proposals = [
+        sampler.propose(chains, generator, batch=batch).position
+        for batch in range(first, first + ROUNDS)
+    ]
     count, dimensions = torch.cat(proposals).shape
     states = {
         "where the chains stand": chains.position,
         "what they propose": torch.cat(proposals),
         "uniform": torch.rand(count, dimensions, generator=generator),
     }
-    iteration = stream["counters"]["iteration"]  # type: ignore[index]
-    return states, instantiate(config.resolution).resolution(iteration)
+    return states, instantiate(config.resolution).resolution(counters.iteration)
 
 
 def _renderer(config: DictConfig, folder: Path, *, factor: int) -> Renderer:

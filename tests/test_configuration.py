@@ -7,7 +7,7 @@ from hydra import compose, initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
 from hydra.core.hydra_config import HydraConfig
 from hydra.utils import instantiate
-from omegaconf import DictConfig
+from omegaconf import DictConfig, open_dict
 
 from ngi.explore import MarkovChains
 from ngi.models import PixelGenerator
@@ -84,6 +84,10 @@ METHODS = {  # sampler, resolution, model, specular
     "active_exploration": ("mcmc_loss_step", "growing", PRECONDITIONED, "learned"),
     "uniform": ("uniform", "constant", PRECONDITIONED, "learned"),
     "uniform_growing": ("uniform", "growing", PRECONDITIONED, "learned"),
+    "sobol": ("sobol", "constant", PRECONDITIONED, "learned"),
+    "latin_hypercube": ("latin_hypercube", "constant", PRECONDITIONED, "learned"),
+    "fixed_data": ("uniform", "constant", PRECONDITIONED, "learned"),
+    "prioritised_replay": ("uniform", "constant", PRECONDITIONED, "learned"),
     "constant_resolution": ("mcmc_loss_step", "constant", PRECONDITIONED, "learned"),
     "loss_target": ("mcmc_loss", "growing", PRECONDITIONED, "learned"),
     "output_gradient_target": ("mcmc_output_gradient", "growing", PRECONDITIONED, "learned"),
@@ -92,6 +96,7 @@ METHODS = {  # sampler, resolution, model, specular
     "cnsr": ("uniform", "constant", "cnsr", "learned"),
     "traced_specular": ("mcmc_loss_step", "growing", PRECONDITIONED, "traced"),
 }
+PRIORITISED = {"_target_": "ngi.reuse.Prioritised", "alpha": 0.6, "beta": 0.4, "epsilon": 1e-6}
 
 
 def test_every_method_is_listed_here() -> None:
@@ -106,6 +111,11 @@ def test_a_method_differs_where_its_name_says_and_nowhere_else(method: str) -> N
     assert found == METHODS[method]
     assert config.label.method == method
     other = composed("budget=small")
+    if method == "fixed_data":
+        other.reuse = composed("budget=small", "reuse=epochs").reuse
+    if method == "prioritised_replay":
+        with open_dict(other):
+            other.reuse.store.rule = PRIORITISED
     for part in ("scene", "loss", "optimizer", "budget", "evaluation", "trainer"):
         assert config[part] == other[part], part
     if method not in COMPETITORS:

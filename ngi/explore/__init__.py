@@ -12,6 +12,7 @@ from ngi.explore.proposals import (
     Proposals,
 )
 from ngi.explore.resolution import GrowingResolution, ResolutionSchedule
+from ngi.explore.space_filling import LatinHypercube, Sobol
 from ngi.explore.targets import Constant as ConstantTarget
 from ngi.explore.targets import Loss, LossTimesOutputGradient, LossTimesStep, Signals, Target
 
@@ -24,6 +25,7 @@ __all__ = [
     "ExponentialPerturbation",
     "Greedy",
     "GrowingResolution",
+    "LatinHypercube",
     "Loss",
     "LossTimesOutputGradient",
     "LossTimesStep",
@@ -34,5 +36,6 @@ __all__ = [
     "Proposals",
     "ResolutionSchedule",
     "Signals",
+    "Sobol",
     "Target",
 ]

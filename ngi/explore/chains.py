@@ -119,7 +119,7 @@ class MarkovChains:
         return self.acceptance.needs_current
 
     def init(self, state_dimensions: int) -> ChainState:
-        """Chains that hold no state yet; each enters the first, uniformly drawn one it proposes.
+        """Chains that hold no state yet; each enters the first one it proposes.
 
         state_dimensions: S = D + 2; raises ValueError below 2.
         """
@@ -133,9 +133,14 @@ class MarkovChains:
             age=torch.zeros(self.chains, dtype=torch.int64),
         )
 
-    def propose(self, state: ChainState, generator: torch.Generator) -> Proposals:
-        """One proposal per chain; one that holds no state makes a large step (paper, Sec. 5)."""
-        proposals = self.proposal.propose(state.position, generator)
+    def propose(self, state: ChainState, generator: torch.Generator, *, batch: int) -> Proposals:
+        """One proposal per chain; one that holds no state makes a large step (paper, Sec. 5).
+
+        batch: how often the run has proposed before, proposals that were given up included
+        """
+        proposals = self.proposal.propose(state.position, generator, batch=batch)
+        if self.proposal.starts_chains:
+            return proposals
         start = torch.empty_like(state.position).uniform_(generator=generator)
         return Proposals(
             position=torch.where(state.occupied[:, None], proposals.position, start),

@@ -1,5 +1,7 @@
 """Where the chains propose to go next (paper, Sec. 5, Eq. 2): large steps and small steps."""
 
+# ruff: noqa: ARG002 - a distribution is given more than it need look at
+
 from __future__ import annotations
 
 import math
@@ -25,8 +27,15 @@ class Proposals:
 class ProposalDistribution(Protocol):
     """The proposal distribution T(u -> v), symmetric: T(u -> v) = T(v -> u)."""
 
-    def propose(self, position: Tensor, generator: torch.Generator) -> Proposals:
+    @property
+    def starts_chains(self) -> bool:
+        """Whether chains that hold no state begin at its proposals, or at uniformly drawn ones."""
+        ...
+
+    def propose(self, position: Tensor, generator: torch.Generator, *, batch: int) -> Proposals:
         """Proposes one new state for each of n chains at `position` [n, S], in [0, 1]^S.
+
+        batch: how often the run has proposed before
 
         `generator` is on the device of `position`; how many numbers are drawn from it depends on
         the shape only.
@@ -60,6 +69,8 @@ class NormalPerturbation:
     large_step_probability: float
     standard_deviation: float
 
+    starts_chains = False
+
     def __post_init__(self) -> None:
         _check_probability(self.large_step_probability)
         if not 0 < self.standard_deviation < math.inf:
@@ -68,7 +79,7 @@ class NormalPerturbation:
                 "of the unit hypercube's side"
             )
 
-    def propose(self, position: Tensor, generator: torch.Generator) -> Proposals:
+    def propose(self, position: Tensor, generator: torch.Generator, *, batch: int) -> Proposals:
         """See `ProposalDistribution.propose`."""
         normal = torch.empty_like(position).normal_(generator=generator)
         return _mix(
@@ -95,6 +106,8 @@ class ExponentialPerturbation:
     smallest: float
     largest: float
 
+    starts_chains = False
+
     def __post_init__(self) -> None:
         _check_probability(self.large_step_probability)
         if not 0 < self.smallest <= self.largest <= 0.5:
@@ -103,7 +116,7 @@ class ExponentialPerturbation:
                 "0 < smallest <= largest <= 0.5 (half way round the unit hypercube)"
             )
 
-    def propose(self, position: Tensor, generator: torch.Generator) -> Proposals:
+    def propose(self, position: Tensor, generator: torch.Generator, *, batch: int) -> Proposals:
         """See `ProposalDistribution.propose`."""
         xi = torch.empty_like(position).uniform_(generator=generator)
         size = self.largest * torch.exp(-math.log(self.largest / self.smallest) * xi)

@@ -21,23 +21,26 @@ class Batch:
     generated: whether they were rendered for this batch
     current: [n] the chains' current states, to be scored beside the proposals; None where the
         acceptance rule does not look at them, on the first batch, and on reuse
+    loss_weights: [n] factors of the samples' losses in the batch's mean; None for 1
     """
 
     patches: Patches
     ids: Tensor
     generated: bool
     current: Patches | None
+    loss_weights: Tensor | None = None
 
     def to(self, device: torch.device | str) -> Batch:
         current = None if self.current is None else self.current.to(device)
-        return Batch(self.patches.to(device), self.ids.to(device), self.generated, current)
+        weights = None if self.loss_weights is None else self.loss_weights.to(device)
+        return Batch(self.patches.to(device), self.ids.to(device), self.generated, current, weights)
 
 
 @dataclass(frozen=True)
 class Feedback:
     """What the training step learnt from a batch, all under the weights before that step.
 
-    losses: [n] loss per sample
+    losses: [n] loss per sample, without weights
     target_proposed: [n] target density of the proposals, which the step's backward pass brings;
         None where nothing had to be scored
     target_current: [n] that of the chains' current states
@@ -71,6 +74,11 @@ class Counters:
     batches_refused: int = 0
     steps_refused: int = 0
     steps_scaled: int = 0
+
+    @property
+    def proposed_batches(self) -> int:
+        """How often the chains' proposals were rendered, or refused, so far."""
+        return self.generated_batches + self.batches_refused
 
     def count_generated(self, rendered: RenderedPatches) -> None:
         """Adds one generated batch."""

@@ -24,7 +24,7 @@ OptimizerFactory = Callable[[Iterable[nn.Parameter]], torch.optim.Optimizer]
 
 
 class IlluminationModule(LightningModule):
-    """Fits `network` to log1p radiance by the mean of `loss` over a batch.
+    """Fits `network` to log1p radiance by the mean of `loss` over a batch, weighted as it says.
 
     network: (buffers [n, H, W, C], scene_vector [n, D], or whatever else the samples give it) ->
         log1p radiance [n, H, W, 3]
@@ -76,7 +76,8 @@ class IlluminationModule(LightningModule):
             with self._scorer.watch(batch.patches, batch.current, self._optimizer()) as score:
                 losses, prediction = self._losses(batch.patches)
             feedback = Feedback(losses.detach(), *score(prediction, losses))
-        return {"loss": losses.mean(), "feedback": feedback}
+        weighted = losses if batch.loss_weights is None else losses * batch.loss_weights
+        return {"loss": weighted.mean(), "feedback": feedback}
 
     def _losses(self, patches: Patches) -> tuple[Tensor, Tensor]:
         inputs, target = self._example(patches)

@@ -153,6 +153,7 @@ class StepGuard(Callback):
             "optimizer": trainer.optimizers[0].state_dict(),
             "patches": {f.name: getattr(patches, f.name) for f in fields(patches)},
             "losses": outputs["feedback"].losses,
+            "loss_weights": batch.loss_weights,
         }
         write_tensors(self._report, content)
 

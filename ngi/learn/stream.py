@@ -203,8 +203,13 @@ class TrainingStream(IterableDataset[Batch]):
             draw = torch.rand((), generator=self._generator, dtype=torch.float64)
             if draw < self.reuse_probability or self._postpone(ahead):
                 ids = self.store.draw(self.sampler.chains, self._generator)
-                patches = self._samples.rearranged(self.store.get(ids), self._generator)
-                return Batch(patches, ids, generated=False, current=None)
+                return Batch(
+                    self._samples.rearranged(self.store.get(ids), self._generator),
+                    ids,
+                    generated=False,
+                    current=None,
+                    loss_weights=self.store.loss_weights(ids),
+                )
         return self._generate(ahead)
 
     def _propose(self) -> ProposalsAhead:
@@ -215,7 +220,9 @@ class TrainingStream(IterableDataset[Batch]):
         if self._ahead is None:
             with self._clock.phase("explore"):
                 self._ahead = ProposalsAhead(
-                    self.sampler.propose(self._chains, self._generator),
+                    self.sampler.propose(
+                        self._chains, self._generator, batch=self.counters.proposed_batches
+                    ),
                     resolution=self._schedule.resolution(self.counters.iteration),
                     seed=int(torch.randint(2**31, (), generator=self._generator)),
                 )

@@ -1,10 +1,11 @@
-"""Reuse of rendered patches: the store, its checkpoints, and the policies that decide on reuse.
+"""Reuse of rendered patches: the store, its checkpoints, what is drawn from it and when.
 
 Tensors only: neither renderer nor network is known here.
 """
 
 from ngi.reuse.archive import PatchArchive
 from ngi.reuse.compact import CompactPatches
+from ngi.reuse.drawing import DrawingRule, Epochs, Prioritised, ProportionalToLoss
 from ngi.reuse.policies import (
     FixedProbability,
     Never,
@@ -17,11 +18,15 @@ from ngi.reuse.store import PatchStore
 
 __all__ = [
     "CompactPatches",
+    "DrawingRule",
+    "Epochs",
     "FixedProbability",
     "Never",
     "PatchArchive",
     "PatchStore",
     "PolicyState",
+    "Prioritised",
+    "ProportionalToLoss",
     "ReusePolicy",
     "SelfTuning",
     "UntilFull",

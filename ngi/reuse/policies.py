@@ -97,7 +97,12 @@ class Never(_Stateless):
 
 
 class UntilFull(_Stateless):
-    """Generates until the store is full and reuses from then on: a data set made beforehand."""
+    """Generates until the store is full and reuses from then on: a fixed data set.
+
+    Patches are trained on as they are generated, which is the first epoch. Were the data set made
+    before any training, that epoch would end after as many steps and as much run time; only the
+    weights in between, which evaluations and checkpoints see, would still be untrained.
+    """
 
     def probability(
         self,

@@ -10,25 +10,31 @@ from torch import Tensor
 
 from ngi.patches import BufferLayout, Patches
 from ngi.reuse.compact import CompactPatches, PatchBlocks
+from ngi.reuse.drawing import DrawingRule, ProportionalToLoss
 
 
 class PatchStore:
-    """Keeps up to `capacity` patches and draws them in proportion to their last recorded loss.
+    """Keeps up to `capacity` patches and draws some of them to be trained on again.
 
     capacity: number of patches (release: 100,000); when it is reached the oldest patches that are
         not pinned make room
     layout: the buffers of the scene's patches
+    rule: which patches are drawn; None for the paper's, in proportion to their last losses
 
     Patches are known by their ids, which count up from 0 and are never used again; a stored patch
     never changes. Everything is kept and given on the CPU, see `CompactPatches` for the precision.
     A checkpoint of it is made by `PatchArchive`.
     """
 
-    def __init__(self, *, capacity: int, layout: BufferLayout) -> None:
+    def __init__(
+        self, *, capacity: int, layout: BufferLayout, rule: DrawingRule | None = None
+    ) -> None:
         if capacity < 1:
             raise ValueError(f"capacity: {capacity}: give at least 1, in patches")
         self.capacity = capacity
         self.layout = layout
+        self._rule = rule or ProportionalToLoss()
+        self._waiting = torch.zeros(0, dtype=torch.int64)  # slots, as the rule left them
         self._blocks = PatchBlocks(capacity=capacity)
         self._slots: dict[int, int] = {}  # id -> slot, oldest id first; slots 0 … len - 1 are full
         self._ids = torch.zeros(capacity, dtype=torch.int64)  # by slot
@@ -111,20 +117,24 @@ class PatchStore:
         return self._blocks.read(self._slots_of(ids))
 
     def draw(self, count: int, generator: torch.Generator) -> Tensor:
-        """Draws ids, [count] int64, with replacement, in proportion to the last recorded losses.
+        """Draws ids, [count] int64, as `rule` says. `generator` is on the CPU.
 
-        With all losses 0 every patch is as likely. `generator` is on the CPU.
         Raises ValueError for an empty store.
         """
         if not self._slots:
             raise ValueError("the store is empty: generate patches before drawing any")
-        cumulative = self._losses[: len(self)].cumsum(0)
-        if cumulative[-1] < torch.finfo(torch.float64).tiny:
-            return self._ids[torch.randint(len(self), (count,), generator=generator)]
-        # rand < 1 keeps the product below the last element also after rounding (not for subnormal
-        # numbers, hence `tiny`); right=True takes the first element above it: its loss is not 0.
-        uniform = torch.rand(count, dtype=torch.float64, generator=generator) * cumulative[-1]
-        return self._ids[torch.searchsorted(cumulative, uniform, right=True)]
+        losses = self._losses[: len(self)]
+        slots, self._waiting = self._rule.draw(losses, self._waiting, count, generator)
+        return self._ids[slots]
+
+    def loss_weights(self, ids: Tensor) -> Tensor | None:
+        """[n] float32, the factors of n just drawn patches' losses in a batch's mean; None for 1.
+
+        Raises ValueError for ids that are not stored.
+        """
+        slots = torch.tensor(self._slots_of(ids), dtype=torch.int64)
+        weights = self._rule.weights(self._losses[: len(self)], slots)
+        return None if weights is None else weights.float()
 
     def hardest(self, count: int) -> tuple[Tensor, Tensor]:
         """Ids and losses of the patches of the highest recorded losses, at most `count` each."""
@@ -162,6 +172,7 @@ class PatchStore:
         return {
             "ids": self._ids[: len(self)].clone(),
             "losses": self._losses[: len(self)].clone(),
+            "waiting": self._waiting,
             "pinned": sorted(self._pinned),
             "next_id": self._next_id,
             "non_finite_losses": self._non_finite_losses,
@@ -200,6 +211,7 @@ class PatchStore:
         self._slots = dict(sorted(slots.items()))
         self._ids[: len(ids)] = state["ids"]
         self._losses[: len(ids)] = state["losses"]
+        self._waiting = state["waiting"]
         self._pinned = frozenset(state["pinned"])
         self._next_id = state["next_id"]
         self._non_finite_losses = state["non_finite_losses"]

@@ -104,7 +104,7 @@ def _many_variables(_: Conditions, *, dimensions: int) -> Outcome:
         acceptance=Greedy(accept_equal=True),
     )
     generator = torch.Generator().manual_seed(0)
-    proposals = chains.propose(chains.init(dimensions + 2), generator)
+    proposals = chains.propose(chains.init(dimensions + 2), generator, batch=0)
     patches = Patches.blank(16, layout=layout, dimensions=dimensions, patch_size=32)
     patches = Patches(**{**vars(patches), "scene_vector": proposals.position[:, :-2]})
     store = PatchStore(capacity=32, layout=layout)

@@ -85,7 +85,7 @@ def walk(
     inside = accepted = longest = 0
     distance = 0.0
     for step in range(1, steps + 1):
-        proposals = chains.propose(state, generator)
+        proposals = chains.propose(state, generator, batch=step - 1)
         current, proposed = (
             torch.where(_inside(position, side), height, 1.0)
             for position in (state.position, proposals.position)
@@ -153,9 +153,9 @@ def _wrap_around(_: Conditions) -> Outcome:
     proposal = NormalPerturbation(large_step_probability=0.0, standard_deviation=WRAPPED)
     corners = torch.tensor(list(product((0.0, 1.0), repeat=8)))
     generator = torch.Generator().manual_seed(0)
-    states = [proposal.propose(corners, generator).position for _ in range(200)]
+    states = [proposal.propose(corners, generator, batch=0).position for _ in range(200)]
     tiny = NormalPerturbation(large_step_probability=0.0, standard_deviation=1e-12)
-    states += [tiny.propose(corners, generator).position for _ in range(200)]
+    states += [tiny.propose(corners, generator, batch=0).position for _ in range(200)]
     position = torch.stack(states)
     return Outcome(
         finite=bool(position.isfinite().all()),

@@ -25,8 +25,9 @@ class FixedProposal:
 
     position: torch.Tensor
     large_step: torch.Tensor
+    starts_chains: bool = False
 
-    def propose(self, position, generator):  # noqa: ARG002
+    def propose(self, position, generator, *, batch):  # noqa: ARG002
         assert position.shape == self.position.shape
         return Proposals(position=self.position, large_step=self.large_step)
 
@@ -70,7 +71,7 @@ def test_a_chain_without_a_state_makes_a_large_step() -> None:
     state = ChainState(
         position=torch.zeros(3, 4), patch=torch.tensor([-1, 7, -1]), age=torch.zeros(3)
     )
-    proposals = chains.propose(state, generator())
+    proposals = chains.propose(state, generator(), batch=0)
     assert proposals.large_step.tolist() == [True, False, True]
     assert (proposals.position[1] == 0.75).all()
     assert (proposals.position[[0, 2]] != 0.75).all()
@@ -81,7 +82,7 @@ def test_a_chain_without_a_state_makes_a_large_step() -> None:
 def test_accept_moves_the_chains_the_rule_chooses() -> None:
     rule = FixedAcceptance(torch.tensor([True, False, True]))
     chains, state = sampler(rule), standing()
-    proposals = chains.propose(state, generator())
+    proposals = chains.propose(state, generator(), batch=0)
     current, proposed = torch.tensor([1.0, 2.0, 3.0]), torch.tensor([4.0, 5.0, 6.0])
     moved, info = chains.accept(
         state, proposals, torch.tensor([10, 11, 12]), current, proposed, generator()
@@ -103,7 +104,7 @@ def test_info_tells_large_from_small_steps_and_leaves_out_first_states() -> None
     )
     ones = torch.ones(4)
     _, info = chains.accept(
-        state, chains.propose(state, generator()), torch.arange(4), ones, ones, generator()
+        state, chains.propose(state, generator(), batch=0), torch.arange(4), ones, ones, generator()
     )
     assert info.accepted.tolist() == [True, False, False, True]
     assert info.acceptance_rate == pytest.approx(1 / 3)
@@ -117,7 +118,7 @@ def test_rates_of_nothing_are_nan() -> None:
     state = chains.init(4)
     ones = torch.ones(3)
     _, info = chains.accept(
-        state, chains.propose(state, generator()), torch.arange(3), None, ones, generator()
+        state, chains.propose(state, generator(), batch=0), torch.arange(3), None, ones, generator()
     )
     assert info.accepted.all()
     assert math.isnan(info.acceptance_rate)
@@ -133,7 +134,7 @@ def test_a_chain_without_a_state_accepts_whatever_stands_for_its_target(rule, cu
     state = chains.init(4)
     moved, _ = chains.accept(
         state,
-        chains.propose(state, generator()),
+        chains.propose(state, generator(), batch=0),
         torch.arange(3),
         torch.full((3,), current),
         torch.tensor([0.0, 1.0, 2.0]),
@@ -152,7 +153,7 @@ def test_non_finite_targets_neither_win_nor_block(rule, bad) -> None:
     state.patch[4] = -1
     moved, info = chains.accept(
         state,
-        chains.propose(state, generator()),
+        chains.propose(state, generator(), batch=0),
         torch.arange(5) + 10,
         torch.tensor([0.0, bad, bad, bad, 0.0]),
         torch.tensor([bad, bad, 0.0, 1.0, bad]),
@@ -168,7 +169,13 @@ def test_only_a_rule_that_looks_needs_the_current_targets() -> None:
     )
     assert not uniform.needs_current
     state = standing()
-    arguments = (state, uniform.propose(state, generator()), torch.arange(3), None, torch.ones(3))
+    arguments = (
+        state,
+        uniform.propose(state, generator(), batch=0),
+        torch.arange(3),
+        None,
+        torch.ones(3),
+    )
     moved, _ = uniform.accept(*arguments, generator())
     assert (moved.position == 0.75).all()
     with pytest.raises(ValueError, match="target_current: None"):
@@ -180,7 +187,7 @@ def test_targets_may_need_gradients_and_be_half_precision() -> None:
     proposed = torch.ones(3, dtype=torch.bfloat16, requires_grad=True)
     moved, _ = chains.accept(
         state,
-        chains.propose(state, generator()),
+        chains.propose(state, generator(), batch=0),
         torch.arange(3),
         torch.zeros(3),
         proposed * 2,
@@ -202,7 +209,7 @@ def test_state_survives_a_checkpoint() -> None:
 
 def test_bad_input_is_named() -> None:
     chains, state = sampler(Greedy(accept_equal=False)), standing()
-    proposals = chains.propose(state, generator())
+    proposals = chains.propose(state, generator(), batch=0)
     ids, ones = torch.arange(3), torch.ones(3)
     with pytest.raises(ValueError, match="target_proposed: shape"):
         chains.accept(state, proposals, ids, ones, torch.ones(2), generator())

@@ -20,13 +20,13 @@ def generator(seed=0):
 def displacement(proposal, start, n=20_000, seed=0):
     """Signed shortest way round the torus, of n one-dimensional chains at `start`."""
     position = torch.full((n, 1), start)
-    moved = proposal.propose(position, generator(seed)).position.double() - start
+    moved = proposal.propose(position, generator(seed), batch=0).position.double() - start
     return ((moved + 0.5) % 1 - 0.5).flatten().numpy()
 
 
 def test_large_steps_are_uniform_in_every_component() -> None:
     proposal = NormalPerturbation(large_step_probability=1, standard_deviation=0.045)
-    proposals = proposal.propose(torch.full((20_000, 3), 0.3), generator())
+    proposals = proposal.propose(torch.full((20_000, 3), 0.3), generator(), batch=0)
     assert proposals.large_step.all()
     for component in proposals.position.T:
         assert stats.kstest(component.numpy(), "uniform").pvalue > SIGNIFICANCE
@@ -35,7 +35,7 @@ def test_large_steps_are_uniform_in_every_component() -> None:
 
 
 def test_small_steps_are_not_uniform() -> None:
-    proposals = NORMAL.propose(torch.full((20_000, 1), 0.3), generator())
+    proposals = NORMAL.propose(torch.full((20_000, 1), 0.3), generator(), batch=0)
     assert stats.kstest(proposals.position.flatten().numpy(), "uniform").pvalue < 1e-9
 
 
@@ -102,7 +102,7 @@ def test_large_steps_come_with_their_probability(cls, probability) -> None:
     )
     proposal = cls(large_step_probability=probability, **sizes)
     position = torch.full((20_000, 2), 0.5)
-    proposals = proposal.propose(position, generator())
+    proposals = proposal.propose(position, generator(), batch=0)
     large = int(proposals.large_step.sum())
     assert stats.binomtest(large, 20_000, probability).pvalue > SIGNIFICANCE
     far = ((proposals.position - position).abs() > 0.3).any(1)
@@ -114,10 +114,10 @@ def test_large_steps_come_with_their_probability(cls, probability) -> None:
 def test_the_generator_alone_decides(proposal) -> None:
     position = torch.full((16, 4), 0.5)
     before = torch.get_rng_state()
-    first = proposal.propose(position, generator(3))
+    first = proposal.propose(position, generator(3), batch=0)
     assert torch.equal(torch.get_rng_state(), before)
-    again = proposal.propose(position, generator(3))
-    other = proposal.propose(position, generator(4))
+    again = proposal.propose(position, generator(3), batch=0)
+    other = proposal.propose(position, generator(4), batch=0)
     assert torch.equal(first.position, again.position)
     assert not torch.equal(first.position, other.position)
     assert (position == 0.5).all()

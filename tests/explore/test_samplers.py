@@ -12,6 +12,7 @@ from ngi.explore import (
     ConstantTarget,
     ExponentialPerturbation,
     Greedy,
+    LatinHypercube,
     Loss,
     LossTimesOutputGradient,
     LossTimesStep,
@@ -19,12 +20,15 @@ from ngi.explore import (
     Metropolis,
     NormalPerturbation,
     Signals,
+    Sobol,
 )
 
 PROPOSALS = [
     NormalPerturbation(large_step_probability=0.3, standard_deviation=0.045),
     NormalPerturbation(large_step_probability=1, standard_deviation=0.045),
     ExponentialPerturbation(large_step_probability=0.3, smallest=1 / 25, largest=1 / 20),
+    Sobol(seed=1),
+    LatinHypercube(),
 ]
 TARGETS = [Loss(), LossTimesStep(), LossTimesOutputGradient(), ConstantTarget()]
 ACCEPTANCES = [Greedy(accept_equal=False), Greedy(accept_equal=True), Metropolis(), Always()]
@@ -41,8 +45,8 @@ def signals(position):
 def explore(sampler, *, dimensions, steps, seed):
     generator = torch.Generator().manual_seed(seed)
     state, infos, next_id = sampler.init(dimensions), [], 0
-    for _ in range(steps):
-        proposals = sampler.propose(state, generator)
+    for batch in range(steps):
+        proposals = sampler.propose(state, generator, batch=batch)
         ids = torch.arange(next_id, next_id + sampler.chains)
         next_id += sampler.chains
         current = sampler.target(signals(state.position)) if sampler.needs_current else None
@@ -86,8 +90,8 @@ def final_histogram(acceptance, density, *, chains=8_000, steps=150):
     )
     generator = torch.Generator().manual_seed(5)
     state = sampler.init(2)
-    for _ in range(steps):
-        proposals = sampler.propose(state, generator)
+    for batch in range(steps):
+        proposals = sampler.propose(state, generator, batch=batch)
         state, _ = sampler.accept(
             state,
             proposals,

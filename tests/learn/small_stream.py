@@ -11,6 +11,7 @@ from ngi.explore import (
     Loss,
     MarkovChains,
     NormalPerturbation,
+    ProposalDistribution,
     ResolutionSchedule,
 )
 from ngi.learn.batch import Batch, Feedback
@@ -18,7 +19,7 @@ from ngi.learn.clock import PhaseClock
 from ngi.learn.samples import PatchSamples
 from ngi.learn.stream import TrainingStream
 from ngi.render import AnalyticRenderer
-from ngi.reuse import FixedProbability, PatchArchive, PatchStore, ReusePolicy
+from ngi.reuse import DrawingRule, FixedProbability, PatchArchive, PatchStore, ReusePolicy
 
 CHAINS = 4
 
@@ -31,7 +32,9 @@ def make(
     folder: Path,
     *,
     greedy: bool = True,
+    proposal: ProposalDistribution | None = None,
     policy: ReusePolicy | None = None,
+    rule: DrawingRule | None = None,
     schedule: ResolutionSchedule | None = None,
     capacity: int = 64,
     seed: int = 0,
@@ -44,11 +47,12 @@ def make(
         samples=PatchSamples(renderer=renderer),
         sampler=MarkovChains(
             chains=CHAINS,
-            proposal=NormalPerturbation(large_step_probability=0.3, standard_deviation=0.05),
+            proposal=proposal
+            or NormalPerturbation(large_step_probability=0.3, standard_deviation=0.05),
             target=Loss() if greedy else ConstantTarget(),
             acceptance=Greedy(accept_equal=False) if greedy else Always(),
         ),
-        store=PatchStore(capacity=capacity, layout=renderer.layout),
+        store=PatchStore(capacity=capacity, layout=renderer.layout, rule=rule),
         archive=PatchArchive(folder),
         policy=policy or FixedProbability(bootstrap_batches=3, probability=0.5),
         schedule=schedule or constant_resolution(24),

@@ -42,12 +42,13 @@ VARIANTS = (
     (),
     (
         "renderer=pockets",
-        "sampler=uniform",
+        "sampler=sobol",
         "reuse=fixed",
+        "method=prioritised_replay",
         "resolution=constant",
         "loss=l1_dssim_release",
     ),
-    ("renderer=pockets", "sampler=mcmc_release", "reuse=until_full", "budget=steps"),
+    ("renderer=pockets", "sampler=mcmc_release", "reuse=epochs", "budget=steps"),
 )
 NAMES = {"lr": "learning rate", "seed": "seed"}
 """Words for a key in messages that are not ours."""

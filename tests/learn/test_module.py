@@ -102,6 +102,20 @@ def test_scoring_does_not_change_the_gradient() -> None:
         torch.testing.assert_close(a, b, rtol=1e-10, atol=1e-14)
 
 
+def test_weights_scale_what_each_sample_does_and_not_what_is_said_of_it() -> None:
+    made, samples = module(Loss()), patches(4, 0)
+    weights = torch.tensor([1.0, 0.25, 0.5, 0.0])
+    step = made.training_step(Batch(samples, torch.arange(4), False, None, weights), 0)
+    plain = made.training_step(Batch(samples, torch.arange(4), False, None), 0)
+    assert torch.equal(step["feedback"].losses, plain["feedback"].losses)
+    parameters = list(made.parameters())
+    found = torch.autograd.grad(step["loss"], parameters)
+    losses = LOSS(made.network(samples.buffers, samples.scene_vector), samples.log_radiance)
+    mean = sum(w * loss for w, loss in zip(weights.tolist(), losses, strict=True)) / 4
+    for ours, expected in zip(found, torch.autograd.grad(mean, parameters), strict=True):
+        torch.testing.assert_close(ours, expected)
+
+
 def test_initial_weights_depend_on_the_seed_alone() -> None:
     def weights(seed: int) -> torch.Tensor:
         torch.rand(7)  # whatever the global generator did before

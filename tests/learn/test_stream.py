@@ -1,13 +1,26 @@
 """The stream alone: a made-up training step answers each batch."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 import torch
 
-from ngi.explore import GrowingResolution
-from ngi.reuse import Never, UntilFull
-from tests.learn.small_stream import CHAINS, constant_resolution, make, steps
+from ngi.explore import GrowingResolution, LatinHypercube, ProposalDistribution, Sobol
+from ngi.learn import TrainingStream
+from ngi.render import AnalyticRenderer
+from ngi.render.protocol import RenderedPatches
+from ngi.reuse import (
+    DrawingRule,
+    Epochs,
+    FixedProbability,
+    Never,
+    Prioritised,
+    ReusePolicy,
+    UntilFull,
+)
+from tests.learn.comparison import assert_same
+from tests.learn.small_stream import CHAINS, answer, constant_resolution, make, steps
 
 
 def test_first_batches_are_new_and_later_ones_are_not_all(tmp_path: Path) -> None:
@@ -52,10 +65,32 @@ def test_the_current_states_survive_a_store_that_is_too_small_for_the_rest(tmp_p
     assert sum(batch.current is not None for batch in steps(stream, 50)) == 49
 
 
-def test_a_full_store_is_a_fixed_data_set(tmp_path: Path) -> None:
-    stream = make(tmp_path, policy=UntilFull(), capacity=8 * CHAINS)
-    generated = [batch.generated for batch in steps(stream, 20)]
-    assert generated == [True] * 8 + [False] * 12
+def test_a_fixed_data_set_is_gone_through_in_epochs(tmp_path: Path) -> None:
+    stream = make(tmp_path, policy=UntilFull(), rule=Epochs(), capacity=8 * CHAINS)
+    batches = list(steps(stream, 8 * 6))
+    assert [batch.generated for batch in batches] == [True] * 8 + [False] * 40
+    drawn = torch.cat([batch.ids for batch in batches]).reshape(6, 8 * CHAINS)
+    for epoch in drawn:
+        assert torch.equal(epoch.sort().values, torch.arange(8 * CHAINS))
+    assert torch.equal(drawn[0], torch.arange(8 * CHAINS)), "the first is that of generation"
+    assert drawn.unique(dim=0).shape[0] == 6
+    assert stream.counters.patches_traced == 8 * CHAINS
+
+
+def test_what_was_drawn_by_priority_has_weights(tmp_path: Path) -> None:
+    stream = make(tmp_path, rule=Prioritised(alpha=0.6, beta=1.0, epsilon=1e-6))
+    losses = torch.zeros(1000)
+    for batch in steps(stream, 40):
+        if batch.generated:
+            assert batch.loss_weights is None
+        else:
+            assert batch.loss_weights is not None
+            expected = losses[batch.ids] ** -0.6
+            torch.testing.assert_close(
+                batch.loss_weights, expected / expected.max(), rtol=1e-4, atol=0
+            )
+            assert torch.equal(batch.to("cpu").loss_weights, batch.loss_weights)
+        losses[batch.ids] = answer(batch).losses
 
 
 def test_the_resolution_grows_with_the_steps(tmp_path: Path) -> None:
@@ -73,18 +108,77 @@ def test_same_seed_same_batches_other_seed_others(tmp_path: Path) -> None:
         assert not torch.equal(a.patches.scene_vector, c.patches.scene_vector)
 
 
-def test_a_restored_stream_goes_on_bit_for_bit(tmp_path: Path) -> None:
-    unbroken = make(tmp_path / "a")
+HALF = FixedProbability(bootstrap_batches=3, probability=0.5)
+
+
+@pytest.mark.parametrize(
+    ("proposal", "policy", "rule"),
+    [
+        (None, HALF, None),
+        (lambda: Sobol(seed=5), HALF, None),
+        (LatinHypercube, HALF, None),
+        (None, UntilFull(), Epochs()),
+        (None, HALF, Prioritised(alpha=0.6, beta=0.4, epsilon=1e-6)),
+    ],
+)
+def test_a_restored_stream_goes_on_bit_for_bit(
+    tmp_path: Path,
+    proposal: Callable[[], ProposalDistribution] | None,
+    policy: ReusePolicy,
+    rule: DrawingRule | None,
+) -> None:
+    def begin(seed: int) -> TrainingStream:
+        return make(
+            tmp_path / "a",
+            seed=seed,
+            greedy=proposal is None,
+            proposal=None if proposal is None else proposal(),
+            policy=policy,
+            rule=rule,
+            capacity=11 * CHAINS + 1,
+        )
+
+    unbroken = begin(seed=0)
     for _ in steps(unbroken, 20):
         pass
     state = unbroken.state_dict()
-    restored = make(tmp_path / "a", seed=99)
+    restored = begin(seed=99)
     restored.load_state_dict(state)
     for a, b in zip(steps(unbroken, 20), steps(restored, 20), strict=True):
         assert a.generated == b.generated
         assert torch.equal(a.ids, b.ids)
         assert torch.equal(a.patches.buffers, b.patches.buffers)
-    assert unbroken.log_row() == restored.log_row()
+        assert_same(a.loss_weights, b.loss_weights)
+    assert repr(unbroken.log_row()) == repr(restored.log_row())  # NaN equals NaN here
+
+
+class NaNRenderer(AnalyticRenderer):
+    """Its first two batches and the fifth hold NaN."""
+
+    def __init__(self) -> None:
+        super().__init__(dimensions=3, patch_size=8)
+        self.rendered: list[torch.Tensor] = []
+
+    def render_patches(
+        self, states: torch.Tensor, *, resolution: int, seed: int
+    ) -> RenderedPatches:
+        self.rendered.append(states)
+        patches = super().render_patches(states, resolution=resolution, seed=seed)
+        if len(self.rendered) in (1, 2, 5):
+            patches.log_radiance[0] = float("nan")
+        return patches
+
+
+def test_sobol_points_follow_each_other_where_some_are_reused_or_refused(tmp_path: Path) -> None:
+    renderer, sobol = NaNRenderer(), Sobol(seed=2)
+    stream = make(tmp_path, greedy=False, proposal=sobol, renderer=renderer)
+    for _ in steps(stream, 30):
+        pass
+    assert stream.counters.batches_refused == 3
+    assert 10 < len(renderer.rendered) < 30
+    for batch, states in enumerate(renderer.rendered):
+        expected = sobol.propose(torch.zeros(CHAINS, 5), torch.Generator(), batch=batch)
+        assert torch.equal(states, expected.position)
 
 
 def test_a_batch_without_feedback_stops_the_stream(tmp_path: Path) -> None:

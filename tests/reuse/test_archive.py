@@ -41,7 +41,7 @@ def assert_same(store, other):
             assert tensor.dtype == expected[name].dtype
             assert torch.equal(tensor, expected[name])
     state, others = store.state_dict(), other.state_dict()
-    for name in ("ids", "losses"):
+    for name in ("ids", "losses", "waiting"):
         assert torch.equal(state.pop(name), others.pop(name))
     assert state == others
 

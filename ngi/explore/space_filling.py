@@ -1,0 +1,84 @@
+"""States spread more evenly than uniform draws, whatever the network says: to compare with.
+
+Neither looks at where a chain stands; with `Always` the chains go from batch to batch.
+"""
+
+# ruff: noqa: ARG002 - a distribution is given more than it need look at
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+from torch.quasirandom import SobolEngine
+
+from ngi.explore.proposals import Proposals
+
+
+class Sobol:
+    """A scrambled Sobol sequence: batch b of n points holds its points n b to n (b + 1) - 1.
+
+    Direction numbers of Joe and Kuo (2008), scrambled by random linear maps and a digital shift
+    (Matousek 1998), as PyTorch does it. Which points a batch gets depends on its number alone, so
+    that there is no place in the sequence that a checkpoint would have to hold.
+
+    seed: the run's. The scrambling is seeded with a number drawn from it: seeded with the same one,
+        PyTorch's sequences of all dimensions begin with the same point, and the run whose seed is
+        that of the test frames (`ngi.evaluate.evaluation_frames`) would be trained on the first.
+    """
+
+    starts_chains = True
+
+    def __init__(self, *, seed: int) -> None:
+        generator = torch.Generator().manual_seed(seed)
+        self._seed = int(torch.randint(2**31, (), generator=generator))
+        self._engine: SobolEngine | None = None  # kept to save time, nothing else
+
+    def propose(self, position: Tensor, generator: torch.Generator, *, batch: int) -> Proposals:
+        """See `ProposalDistribution.propose`; nothing is drawn from `generator`.
+
+        Raises ValueError for more than 21,201 dimensions.
+        """
+        count, dimensions = position.shape
+        if dimensions > SobolEngine.MAXDIM:
+            raise ValueError(
+                f"sampler=sobol: {dimensions} dimensions (the scene's variables and the patch "
+                f"position): the sequence is known for at most {SobolEngine.MAXDIM}; choose "
+                "sampler=latin_hypercube"
+            )
+        if self._engine is None or self._engine.dimension != dimensions:
+            self._engine = SobolEngine(dimensions, scramble=True, seed=self._seed)
+        skipped = batch * count - self._engine.num_generated
+        if skipped < 0:
+            self._engine.reset()
+            skipped = batch * count
+        if skipped > 0:
+            self._engine.fast_forward(skipped)
+        return _large_steps(self._engine.draw(count, dtype=torch.float64), position)
+
+
+class LatinHypercube:
+    """n points of which every variable has one in each of n equal intervals (McKay et al. 1979).
+
+    Each batch is such a set by itself. One set of all patches of a run would be spread more evenly
+    still, but how many they are is known at its end only, and part of a set promises nothing; any
+    number of batches has equally many points in each of the n intervals.
+    """
+
+    starts_chains = True
+
+    def propose(self, position: Tensor, generator: torch.Generator, *, batch: int) -> Proposals:
+        """See `ProposalDistribution.propose`."""
+        keys, offset = torch.empty(
+            (2, *position.shape), dtype=torch.float64, device=position.device
+        ).uniform_(generator=generator)
+        interval = keys.argsort(dim=0)  # of each variable a permutation of its own
+        return _large_steps((interval + offset) / len(position), position)
+
+
+def _large_steps(points: Tensor, like: Tensor) -> Proposals:
+    """Points [n, S] float64 in [0, 1), rounded down, so that none becomes 1 or changes its cell."""
+    position = (points * 2**24).floor() / 2**24
+    return Proposals(
+        position=position.to(like),
+        large_step=torch.ones(len(points), dtype=torch.bool, device=like.device),
+    )
