@@ -20,6 +20,12 @@ TITLES = {
     "constant_resolution": "exploration at constant resolution",
     "uniform_growing": "uniform sampling with growing resolution",
     "traced_specular": "traced specular bounces",
+    "path_tracing": "path tracing, same time per frame",
+    "path_tracing_oidn": "path tracing + Open Image Denoise, same time per frame",
+    "path_tracing_optix": "path tracing + OptiX denoiser, same time per frame",
+    "path_tracing_8spp": "path tracing, 8 spp",
+    "path_tracing_oidn_8spp": "path tracing + Open Image Denoise, 8 spp",
+    "path_tracing_optix_8spp": "path tracing + OptiX denoiser, 8 spp",
 }
 """What tables and pictures call the options of the configuration group `method`, in order."""
 

@@ -85,8 +85,28 @@ METHODS = {  # sampler, resolution, model, specular
 }
 
 
+PATH_TRACING = {  # option, samples per pixel
+    f"path_tracing{name}{suffix}": (option, samples)
+    for name, option in (("", "plain"), ("_oidn", "oidn"), ("_optix", "optix"))
+    for suffix, samples in (("", None), ("_8spp", 8))
+}
+
+
 def test_every_method_is_listed_here() -> None:
-    assert set(METHODS) == {file.stem for file in (CONF / "method").glob("*.yaml")}
+    found = {file.stem for file in (CONF / "method").glob("*.yaml")}
+    assert found == METHODS.keys() | PATH_TRACING.keys()
+
+
+@pytest.mark.parametrize("method", PATH_TRACING)
+def test_path_tracing_takes_the_place_of_training_and_changes_nothing_else(method: str) -> None:
+    config = composed(f"method={method}", "budget=small")
+    chosen, other = config.hydra.runtime.choices, composed("budget=small")
+    assert (chosen.path_tracing, config.path_tracing.samples_per_pixel) == PATH_TRACING[method]
+    assert config.path_tracing.milliseconds is None
+    assert {key: config[key] for key in other if key not in ("hydra", "label")} == {
+        key: other[key] for key in other if key not in ("hydra", "label")
+    }
+    assert "path_tracing" not in other
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -15,6 +15,7 @@ from markupsafe import Markup
 
 from analysis.dimensions_plot import dimensions_figure, salons_of_both
 from analysis.evidence import Verdict
+from analysis.frame_times import frame_table
 from analysis.page.images import Illustration, from_figure, from_files
 from analysis.page.sections import Styles, claim_section, scene_section
 from analysis.phases import phase_table
@@ -120,7 +121,11 @@ def _context(
         "times": time_table(runs),
         "exploration_figures": _exploration_figures(contents.exploration_files),
         "dimensions_figures": _dimensions_figures(runs),
-        "costs": [cost_table(summaries), phase_table(runs)],
+        "costs": [
+            table
+            for table in (cost_table(summaries), frame_table(runs), phase_table(runs))
+            if table.rows
+        ],
         "provenance": [provenance_table(runs), machine_table(runs)],
     }
 
