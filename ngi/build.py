@@ -10,20 +10,34 @@ from omegaconf import DictConfig, OmegaConf
 
 if TYPE_CHECKING:  # PyTorch and Lightning take seconds that --help need not wait for
     from ngi.explore import Target
-    from ngi.learn import Budget, Component, Costs, IlluminationModule, PhaseClock, TrainingStream
+    from ngi.learn import (
+        Budget,
+        Component,
+        Costs,
+        IlluminationModule,
+        PhaseClock,
+        Samples,
+        TrainingStream,
+    )
     from ngi.render import Renderer
 
 
+def build_samples(config: DictConfig, *, renderer: Renderer) -> Samples:
+    """What the run's training samples are."""
+    samples: Samples = instantiate(config.data)(renderer=renderer)
+    return samples
+
+
 def build_stream(
-    config: DictConfig, *, renderer: Renderer, clock: PhaseClock, patches: Path
+    config: DictConfig, *, samples: Samples, clock: PhaseClock, patches: Path
 ) -> TrainingStream:
     """The stream of training batches. patches: folder that its store is archived in."""
     from ngi import learn
 
     return learn.TrainingStream(
-        renderer=renderer,
+        samples=samples,
         sampler=instantiate(config.sampler),
-        store=instantiate(config.reuse.store)(layout=renderer.layout),
+        store=instantiate(config.reuse.store)(layout=samples.layout),
         archive=learn.PatchArchive(patches),
         policy=instantiate(config.reuse.policy),
         schedule=instantiate(config.resolution),
@@ -34,19 +48,20 @@ def build_stream(
 
 
 def build_module(
-    config: DictConfig, *, renderer: Renderer, target: Target, clock: PhaseClock
+    config: DictConfig, *, samples: Samples, target: Target, clock: PhaseClock
 ) -> IlluminationModule:
-    """Network, loss and optimiser, for patches as `renderer` gives them."""
+    """Network, loss and optimiser, for these samples."""
     from ngi import learn
 
     return learn.IlluminationModule(
         network=learn.seeded(instantiate(config.model), seed=config.seed)(
-            layout=renderer.layout, scene_dimensions=renderer.dimensions
+            layout=samples.layout, scene_dimensions=samples.dimensions
         ),
         loss=instantiate(config.loss),
         optimizer=instantiate(config.optimizer),
         target=target,
         clock=clock,
+        example=samples.example,
     )
 
 

@@ -19,7 +19,7 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf, open_dict
 from tabulate import tabulate
 
-from ngi.build import build_module, build_stream, plain, run_components
+from ngi.build import build_module, build_samples, build_stream, plain, run_components
 from ngi.config_values import check_values
 from ngi.memory import keep_freed_memory
 from ngi.resources import cache_folder, root
@@ -77,8 +77,9 @@ def _measure(
     if names := {component.name for component in missing} - {"rendering"}:
         measured = _step_seconds(config, renderer=renderer, scored="scoring" in names)
     if any(component.name == "rendering" for component in missing):
+        renderer.warm_up()
         measured["rendering"] = rendering_seconds(
-            renderer, patches=config.sampler.chains, seconds=SECONDS
+            build_samples(config, renderer=renderer), count=config.sampler.chains, seconds=SECONDS
         )
     found = provenance(backend=renderer.description)
     measured_by = {key: found[key] for key in ("commit", "dirty", "machine")}
@@ -105,8 +106,9 @@ def _step_seconds(
     with TemporaryDirectory() as folder:
         clock = learn.PhaseClock()
         run = learn.RunFolder(Path(folder), settings={})
-        stream = build_stream(config, renderer=stand_in, clock=clock, patches=run.patches)
-        module = build_module(config, renderer=stand_in, target=stream.sampler.target, clock=clock)
+        samples = build_samples(config, renderer=stand_in)
+        stream = build_stream(config, samples=samples, clock=clock, patches=run.patches)
+        module = build_module(config, samples=samples, target=stream.sampler.target, clock=clock)
         timer = StepTimer(clock=clock, scored=scored, seconds=SECONDS)
         guard = learn.StepGuard(stream=stream, folder=Path(folder))
         feedback = learn.SamplerFeedback(

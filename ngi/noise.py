@@ -19,7 +19,7 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig, open_dict
 from tabulate import tabulate
 
-from ngi.build import build_module
+from ngi.build import build_module, build_samples
 from ngi.config_values import check_values
 from ngi.costs import in_this_process, with_overrides
 from ngi.resources import root
@@ -48,6 +48,8 @@ def measure(config: DictConfig) -> list[tuple[str, float, float, float]]:
     import torch
 
     from ngi import learn
+    from ngi.explore import Proposals
+    from ngi.learn.ahead import ProposalsAhead
 
     check_values(config)
     folder = Path(config.run.folder)
@@ -60,16 +62,17 @@ def measure(config: DictConfig) -> list[tuple[str, float, float, float]]:
     for factor in (1, MORE_SAMPLES):
         with closing(_renderer(config, folder, factor=factor)) as renderer:
             target = instantiate(config.sampler).target
-            module = build_module(
-                config, renderer=renderer, target=target, clock=learn.PhaseClock()
-            )
+            samples = build_samples(config, renderer=renderer)
+            module = build_module(config, samples=samples, target=target, clock=learn.PhaseClock())
             module.load_state_dict(checkpoint["state_dict"])
             for name, of_set in states.items():
                 for chunk in of_set.split(config.sampler.chains):
-                    patches = renderer.render_patches(chunk, resolution=resolution, seed=factor)
+                    proposals = Proposals(chunk, torch.ones(len(chunk), dtype=torch.bool))
+                    ahead = ProposalsAhead(proposals, resolution=resolution, seed=factor)
+                    ahead.start(samples)
+                    inputs, truth = samples.example(ahead.patches())
                     with torch.no_grad():
-                        output = module.network(patches.buffers, chunk[:, :-2])
-                        losses[name].append(module.loss(output, patches.log_radiance))
+                        losses[name].append(module.loss(module.network(*inputs), truth))
     rows = []
     for name, parts in losses.items():
         noisy, clean = torch.cat(parts).reshape(2, -1).mean(dim=1).tolist()

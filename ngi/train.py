@@ -17,7 +17,7 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
 
 import ngi
-from ngi.build import build_module, build_stream, plain, run_costs
+from ngi.build import build_module, build_samples, build_stream, plain, run_costs
 from ngi.config_values import check_values
 from ngi.energy import EnergyMeter, energy_counters
 from ngi.memory import keep_freed_memory
@@ -95,18 +95,20 @@ def _train(
     interruption: learn.Interruption,
 ) -> dict[str, Any]:
     from ngi import learn
-    from ngi.patches import Patches
 
     clock = learn.PhaseClock(energy=EnergyMeter(energy_counters()))
-    stream = build_stream(config, renderer=renderer, clock=clock, patches=folder.patches)
-    module = build_module(config, renderer=renderer, target=stream.sampler.target, clock=clock)
+    samples = build_samples(config, renderer=renderer)
+    stream = build_stream(config, samples=samples, clock=clock, patches=folder.patches)
+    module = build_module(config, samples=samples, target=stream.sampler.target, clock=clock)
     costs = folder.settings["costs"]
     run_clock = (
         clock if costs is None else learn.ModelClock(costs=costs, counters=lambda: stream.counters)
     )
     recorder = learn.Recorder(
-        evaluator=instantiate(config.evaluation.evaluator)(renderer=renderer),
-        target_map=_target_map(config, renderer, signals=interruption.checked(module.signals)),
+        evaluator=instantiate(config.evaluation.evaluator)(
+            renderer=renderer, test_inputs=samples.test_inputs
+        ),
+        target_map=_target_map(config, samples, signals=interruption.checked(module.signals)),
         predict=interruption.checked(module.predict),
         folder=folder,
         stream=stream,
@@ -129,16 +131,9 @@ def _train(
         checkpoint_steps=config.run.checkpoint_steps,
         interruption=interruption,
     )
-    module.rehearse(
-        Patches.blank(
-            2,
-            layout=renderer.layout,
-            dimensions=renderer.dimensions,
-            patch_size=renderer.patch_size,
-        )
-    )
+    module.rehearse(samples.blank(2))
     if config.viewer:
-        callbacks.append(_live_view(config, renderer, module, stream, folder, clock))
+        callbacks.append(_live_view(config, renderer, samples, module, stream, folder, clock))
     trainer = _trainer(config, budget, folder, callbacks)
     checkpoint = learn.prepare_resume(folder)
     folder.begin()
@@ -178,13 +173,13 @@ def _trainer(
 
 
 def _target_map(
-    config: DictConfig, renderer: Renderer, *, signals: Callable[..., Any]
+    config: DictConfig, samples: learn.Samples, *, signals: Callable[..., Any]
 ) -> learn.TargetMap | None:
     """What is measured of the target density at every evaluation, where that is asked for."""
     if config.evaluation.target_map is None:
         return None
     target_map: learn.TargetMap = instantiate(config.evaluation.target_map)(
-        renderer=renderer,
+        samples=samples,
         resolution=instantiate(config.resolution).resolution(0),
         signals=signals,
     )
@@ -194,6 +189,7 @@ def _target_map(
 def _live_view(
     config: DictConfig,
     renderer: Renderer,
+    samples: learn.Samples,
     module: learn.IlluminationModule,
     stream: learn.TrainingStream,
     folder: learn.RunFolder,
@@ -206,6 +202,7 @@ def _live_view(
         raise RuntimeError(f"viewer=true needs {error.name}: pip install -e .[viewer]") from error
     return live_view(
         renderer=renderer,
+        samples=samples,
         module=module,
         stream=stream,
         folder=folder,

@@ -12,10 +12,9 @@ import torch
 from torch import Tensor
 
 from ngi.benchmark.figures import repeated, timed
-from ngi.learn import Batch, PhaseClock
+from ngi.learn import Batch, PhaseClock, Samples
 from ngi.learn.clock import PHASES
 from ngi.learn.lightning_api import Callback, Trainer
-from ngi.render import Renderer
 from ngi.reuse.policies import PolicyState
 
 Seconds = dict[str, list[float]]
@@ -28,8 +27,8 @@ FEWEST_ROUNDS = 5
 MOST_BATCHES = 50
 
 
-def rendering_seconds(renderer: Renderer, *, patches: int, seconds: float) -> Seconds:
-    """Of batches of so many patches, at states drawn uniformly from the scene's whole hypercube.
+def rendering_seconds(samples: Samples, *, count: int, seconds: float) -> Seconds:
+    """Of batches of so many samples, at states drawn uniformly from the scene's whole hypercube.
 
     Where chains gather a patch may cost more or less than on the average over the scene, but that
     differs from run to run. seconds: after so long no batch is begun, once there were three.
@@ -37,11 +36,11 @@ def rendering_seconds(renderer: Renderer, *, patches: int, seconds: float) -> Se
     generator = torch.Generator().manual_seed(0)
 
     def render() -> None:
-        states = torch.rand(patches, renderer.dimensions + 2, generator=generator)
+        states = torch.rand(count, samples.dimensions + 2, generator=generator)
         seed = int(torch.randint(2**31, (), generator=generator))
-        renderer.render_patches(states, resolution=SIDE * renderer.patch_size, seed=seed)
+        resolution = SIDE * samples.patch_size
+        samples.start_patches(states, resolution=resolution, seed=seed).result()
 
-    renderer.warm_up()
     return {"render": repeated(MOST_BATCHES, "rendering", timed(render), seconds=seconds)}
 
 

@@ -9,7 +9,7 @@ import torch
 from ngi.benchmark import PATCH_SIZE, PATCHES
 from ngi.benchmark.figures import Figure, figure, in_turn, ratio
 from ngi.explore import LossTimesOutputGradient, LossTimesStep, Target
-from ngi.learn import PhaseClock, Scorer
+from ngi.learn import PatchSamples, PhaseClock, Scorer
 from ngi.models import L1Dssim, PatchLinear, PixelGenerator
 from ngi.patches import BufferLayout, Patches
 
@@ -60,7 +60,13 @@ class Training:
     def step_with(self, target: Target) -> Callable[[], None]:
         """A step that scores the batch as proposals and, in a pass of its own, as the current."""
         patches = self.patches
-        scorer = Scorer(target=target, network=self.network, loss=self.loss, clock=PhaseClock())
+        scorer = Scorer(
+            target=target,
+            network=self.network,
+            loss=self.loss,
+            clock=PhaseClock(),
+            example=PatchSamples.example,
+        )
 
         def scored_step() -> None:
             self.optimizer.zero_grad()

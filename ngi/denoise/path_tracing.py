@@ -85,10 +85,13 @@ class PathTracing:
         buffers = self.renderer.image_buffers(scene_vector, resolution=resolution)
         return self.denoise(self.trace(scene_vector, resolution=resolution), buffers.cpu())
 
-    def predict(self, buffers: Tensor, scene_vector: Tensor) -> Tensor:
-        """log1p of the next frame, for an `ngi.evaluate.Evaluator`."""
-        noisy = self.trace(scene_vector, resolution=buffers.shape[0])
-        return torch.log1p(self.denoise(noisy, buffers))
+    def test_inputs(self, scene_vector: Tensor, *, resolution: int) -> tuple[Tensor, ...]:
+        """What an `ngi.evaluate.Evaluator` gives to `predict` beside buffers: the next frame."""
+        return (self.trace(scene_vector, resolution=resolution),)
+
+    def predict(self, buffers: Tensor, radiance: Tensor) -> Tensor:
+        """log1p of a frame, denoised."""
+        return torch.log1p(self.denoise(radiance, buffers))
 
 
 def guides(buffers: Tensor, layout: BufferLayout) -> tuple[Tensor, Tensor]:

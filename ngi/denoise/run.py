@@ -48,12 +48,14 @@ def run_path_tracing(
     """
     plan = instantiate(config.path_tracing)
     label = {**plain(config.label), **dict.fromkeys(UNUSED, "none"), "seed": config.seed}
-    evaluator = instantiate(config.evaluation.evaluator)(renderer=renderer)
     tracing = PathTracing(
         renderer=renderer,
         denoiser=plan.denoiser,
         samples_per_pixel=plan.samples_per_pixel or 1,
         seed=config.seed,
+    )
+    evaluator = instantiate(config.evaluation.evaluator)(
+        renderer=renderer, test_inputs=tracing.test_inputs
     )
     folder.begin()
     tracker.start(folder=folder.path, settings=folder.settings, label=label)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from torch import Tensor
@@ -62,6 +63,8 @@ class Evaluation:
     predictions: [H, W, 3] linear radiance, in the same order
     references: the reference images, in the same order
     reference_hash: hash over all references
+    seconds: of each frame, in the same order, by part: 'buffers', 'inputs' (whatever else the
+        network is given of a frame, which may have to be path-traced) and 'network'
     lpips_note: why there is no LPIPS, or None
     """
 
@@ -72,6 +75,7 @@ class Evaluation:
     predictions: tuple[Tensor, ...]
     references: tuple[Reference, ...]
     reference_hash: str
+    seconds: tuple[dict[str, float], ...]
     lpips_note: str | None
 
     def row(self) -> dict[str, float | int | None]:
@@ -95,7 +99,7 @@ class Evaluation:
 
         protocol: {name, identity}; reference_hash; metrics: {set: {metric: {mean, worst5, floor}
         or null}}; non_finite: {set: pixels}; frames: per frame its metrics and its reference's
-        noise and samples per pixel; lpips_note.
+        noise and samples per pixel; frame_seconds: by part, median over the frames; lpips_note.
         """
         return {
             "protocol": {"name": self.protocol.name, "identity": self.protocol.identity},
@@ -113,6 +117,10 @@ class Evaluation:
                 }
                 for frame, reference in zip(self.metrics, self.references, strict=True)
             ],
+            "frame_seconds": {
+                part: median(of_frame[part] for of_frame in self.seconds)
+                for part in self.seconds[0]
+            },
             "lpips_note": self.lpips_note,
         }
 

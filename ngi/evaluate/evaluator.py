@@ -6,6 +6,8 @@ import hashlib
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass
+from time import perf_counter
+from typing import TypeVar
 
 import torch
 from torch import Tensor
@@ -23,14 +25,21 @@ from ngi.render.protocol import Renderer
 
 log = logging.getLogger(__name__)
 
-Predict = Callable[[Tensor, Tensor], Tensor]
-"""(buffers [H, W, C], v [D]) -> log1p of linear radiance [H, W, 3]; on any device."""
+T = TypeVar("T")
+
+Predict = Callable[..., Tensor]
+"""(buffers [H, W, C], *test inputs) -> log1p of linear radiance [H, W, 3]; on any device."""
+
+TestInputs = Callable[..., tuple[Tensor, ...]]
+"""(v [D], resolution=pixels a side) -> what a prediction needs beside the buffers."""
 
 
 @dataclass(frozen=True)
 class _PreparedFrame:
     frame: Frame
     buffers: Tensor
+    inputs: tuple[Tensor, ...]
+    seconds: dict[str, float]
     reference: Reference
     floor: FrameMetrics
 
@@ -39,19 +48,24 @@ class Evaluator:
     """Measures predictions of one scene's images.
 
     The references are rendered, or read from the cache, by `prepare`, at the latest by the first
-    evaluation; the buffers, which are never cached, come from the present renderer.
+    evaluation; the buffers and other inputs, which are never cached, are made by the present
+    renderer, each timed.
+
+    test_inputs: makes what predictions need beside the buffers; v alone, or what is rendered at v
     """
 
     def __init__(
         self,
         *,
         renderer: Renderer,
+        test_inputs: TestInputs,
         protocol: EvaluationProtocol,
         cache: ReferenceCache,
         lpips: Lpips,
     ) -> None:
         self.protocol = protocol
         self._renderer = renderer
+        self._test_inputs = test_inputs
         self._cache = cache
         self._lpips = lpips
         self._frames = evaluation_frames(renderer, protocol)
@@ -66,19 +80,23 @@ class Evaluator:
         prepared = []
         with tqdm(self._frames, desc="references", unit="frame") as progress:
             for frame in progress:
+                v = frame.scene_vector
                 reference = self._cache.get(
                     self._renderer,
                     self.protocol,
-                    frame.scene_vector,
+                    v,
                     on_pass=lambda samples, noise: progress.set_postfix_str(
                         f"{samples} spp, noise {noise:.1%}"
                     ),
                 )
+                seconds: dict[str, float] = {}
                 digest.update(f"{frame.set}/{frame.index}/{reference.content_hash}\n".encode())
                 prepared.append(
                     _PreparedFrame(
                         frame=frame,
-                        buffers=self._buffers(frame),
+                        buffers=timed(seconds, "buffers", self._buffers, v),
+                        inputs=timed(seconds, "inputs", self._inputs, v),
+                        seconds=seconds,
                         reference=reference,
                         floor=self._measure(frame, reference.half_a, reference.radiance),
                     )
@@ -105,11 +123,15 @@ class Evaluator:
     def evaluate(self, predict: Predict) -> Evaluation:
         """Predicts and measures every test frame.
 
-        predict: called once per frame, without gradients, with float32 tensors on the CPU.
+        predict: called once per frame, without gradients, with tensors on the CPU.
         Raises ValueError where its answer is not [H, W, 3].
         """
         self.prepare()
-        predictions = tuple(_radiance(predict, prepared) for prepared in self._prepared)
+        seconds = tuple(dict(prepared.seconds) for prepared in self._prepared)
+        predictions = tuple(
+            timed(of_frame, "network", _radiance, predict, prepared)
+            for of_frame, prepared in zip(seconds, self._prepared, strict=True)
+        )
         return Evaluation(
             protocol=self.protocol,
             frames=self._frames,
@@ -121,15 +143,18 @@ class Evaluator:
             predictions=predictions,
             references=tuple(prepared.reference for prepared in self._prepared),
             reference_hash=self._reference_hash,
+            seconds=seconds,
             lpips_note=self._lpips.reason,
         )
 
-    def _buffers(self, frame: Frame) -> Tensor:
+    def _buffers(self, v: Tensor) -> Tensor:
         """[H, W, C] float32 on the CPU."""
-        buffers = self._renderer.image_buffers(
-            frame.scene_vector, resolution=self.protocol.resolution
-        )
+        buffers = self._renderer.image_buffers(v, resolution=self.protocol.resolution)
         return buffers.detach().cpu().float()
+
+    def _inputs(self, v: Tensor) -> tuple[Tensor, ...]:
+        inputs = self._test_inputs(v, resolution=self.protocol.resolution)
+        return tuple(tensor.detach().cpu() for tensor in inputs)
 
     def _measure(self, frame: Frame, prediction: Tensor, reference: Tensor) -> FrameMetrics:
         """prediction, reference: [H, W, 3] linear radiance."""
@@ -144,10 +169,18 @@ class Evaluator:
 def _radiance(predict: Predict, prepared: _PreparedFrame) -> Tensor:
     """[H, W, 3] float32 linear radiance on the CPU; negative values stay as they are."""
     with torch.no_grad():
-        log_radiance = predict(prepared.buffers, prepared.frame.scene_vector)
+        log_radiance = predict(prepared.buffers, *prepared.inputs)
     expected = prepared.reference.half_a.shape
     if log_radiance.shape != expected:
         raise ValueError(
             f"prediction of shape {list(log_radiance.shape)}, expected {list(expected)}"
         )
     return torch.expm1(log_radiance.detach().cpu().float())
+
+
+def timed(seconds: dict[str, float], part: str, compute: Callable[..., T], *arguments: object) -> T:
+    """What `compute` gives; how long it takes is noted as that part's seconds."""
+    begin = perf_counter()
+    result = compute(*arguments)
+    seconds[part] = perf_counter() - begin
+    return result

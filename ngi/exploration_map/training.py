@@ -13,7 +13,7 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
 
 from ngi import learn
-from ngi.build import build_module, build_stream, plain
+from ngi.build import build_module, build_samples, build_stream, plain
 from ngi.exploration_map.plan import Plan
 from ngi.exploration_map.setting import Method, Setting
 from ngi.exploration_map.test_set import TestSet
@@ -53,8 +53,9 @@ def train(setting: Setting, method: Method, seed: int, plan: Plan) -> Iterator[d
     config.seed, config.model.hidden_features = seed, setting.hidden_features
     renderer, test_set = _scene(setting, plan.frames)
     clock = learn.PhaseClock()
-    stream = build_stream(config, renderer=renderer, clock=clock, patches=Path())  # not written
-    module = build_module(config, renderer=renderer, target=stream.sampler.target, clock=clock)
+    samples = build_samples(config, renderer=renderer)
+    stream = build_stream(config, samples=samples, clock=clock, patches=Path())  # not written
+    module = build_module(config, samples=samples, target=stream.sampler.target, clock=clock)
     optimizer = module.configure_optimizers()
     # There is no trainer that would know the optimiser.
     module.optimizers = lambda **_: optimizer  # type: ignore[method-assign,assignment]

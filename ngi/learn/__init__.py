@@ -14,6 +14,7 @@ from ngi.learn.record_log import RecordLog
 from ngi.learn.recorder import Recorder
 from ngi.learn.row_log import RowLog
 from ngi.learn.run_folder import RunFolder
+from ngi.learn.samples import Example, PatchSamples, Samples
 from ngi.learn.scorer import Scorer
 from ngi.learn.step_guard import LARGEST_NORM, StepGuard, gradient_norm
 from ngi.learn.stream import TrainingStream
@@ -30,6 +31,7 @@ __all__ = [
     "CostFile",
     "Costs",
     "Counters",
+    "Example",
     "ExplorationDataModule",
     "Feedback",
     "IlluminationModule",
@@ -38,6 +40,7 @@ __all__ = [
     "Local",
     "ModelClock",
     "PatchArchive",
+    "PatchSamples",
     "PhaseClock",
     "RecordLog",
     "Recorder",
@@ -45,6 +48,7 @@ __all__ = [
     "RunClock",
     "RunFolder",
     "SamplerFeedback",
+    "Samples",
     "Scorer",
     "StepGuard",
     "TargetMap",

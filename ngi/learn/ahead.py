@@ -13,8 +13,9 @@ from typing import Any, Self
 import torch
 
 from ngi.explore import Proposals
+from ngi.learn.samples import Samples
 from ngi.patches import Patches
-from ngi.render.protocol import PatchJob, RenderedPatches, Renderer
+from ngi.render.protocol import PatchJob, RenderedPatches
 
 
 @dataclass
@@ -31,10 +32,10 @@ class ProposalsAhead:
     seed: int
     job: PatchJob | None = None
 
-    def start(self, renderer: Renderer) -> None:
+    def start(self, samples: Samples) -> None:
         """Has the patches rendered; nothing happens the second time."""
         if self.job is None:
-            self.job = renderer.start_patches(
+            self.job = samples.start_patches(
                 self.proposals.position, resolution=self.resolution, seed=self.seed
             )
 

@@ -75,7 +75,7 @@ class Counters:
     def count_generated(self, rendered: RenderedPatches) -> None:
         """Adds one generated batch."""
         self.generated_batches += 1
-        self.patches_traced += len(rendered.buffers)
+        self.patches_traced += rendered.buffers.shape[:-3].numel()
         self.paths_traced += rendered.paths
         self.patches_repaired += rendered.repaired
         self.patches_masked += rendered.masked

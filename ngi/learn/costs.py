@@ -61,11 +61,13 @@ def components(settings: Mapping[str, Any], *, renderer: Renderer, scored: bool)
     scored: whether its sampler looks at the targets of the chains' current states.
     """
     sampler = settings["sampler"]
+    samples = {key: value for key, value in settings["data"].items() if not key.startswith("_")}
     patches = {
         "patches": sampler["chains"],
         "patch_size": renderer.patch_size,
         "buffers": list(renderer.layout.names),
         "dimensions": renderer.dimensions,
+        **samples,
     }
     training = {
         **{part: settings[part] for part in ("model", "loss", "trainer")},
@@ -77,6 +79,7 @@ def components(settings: Mapping[str, Any], *, renderer: Renderer, scored: bool)
         "samples_per_pixel": renderer.samples_per_pixel,
         "scene": {"name": settings["scene"]["name"], "hash": renderer.scene_hash},
         "patches": sampler["chains"],
+        **samples,
     }
     found = [
         Component("training", training),

@@ -12,6 +12,7 @@ from ngi.explore import Signals, Target
 from ngi.learn.batch import Batch, Feedback
 from ngi.learn.clock import PhaseClock
 from ngi.learn.lightning_api import LightningModule
+from ngi.learn.samples import Example
 from ngi.learn.scorer import Scorer
 from ngi.models import SampleLoss
 from ngi.patches import Patches
@@ -24,10 +25,12 @@ OptimizerFactory = Callable[[Iterable[nn.Parameter]], torch.optim.Optimizer]
 class IlluminationModule(LightningModule):
     """Fits `network` to log1p radiance by the mean of `loss` over a batch.
 
-    network: (buffers [n, H, W, C], scene_vector [n, D]) -> log1p radiance [n, H, W, 3]
+    network: (buffers [n, H, W, C], scene_vector [n, D], or whatever else the samples give it) ->
+        log1p radiance [n, H, W, 3]
     loss: (prediction, target) -> loss per sample [n]
     optimizer: makes the optimiser from the parameters
     target: the target density that the chains explore
+    example: see `ngi.learn.Samples.example`
     """
 
     def __init__(
@@ -38,12 +41,14 @@ class IlluminationModule(LightningModule):
         optimizer: OptimizerFactory,
         target: Target,
         clock: PhaseClock,
+        example: Callable[[Patches], Example],
     ) -> None:
         super().__init__()
         self.network = network
         self.loss = loss
         self._make_optimizer = optimizer
         self._clock = clock
+        self._example = example
         self._scorer = self._scorer_of(target)
 
     def configure_optimizers(self) -> torch.optim.Optimizer:
@@ -71,13 +76,18 @@ class IlluminationModule(LightningModule):
         return {"loss": losses.mean(), "feedback": feedback}
 
     def _losses(self, patches: Patches) -> tuple[Tensor, Tensor]:
-        prediction = self.network(patches.buffers, patches.scene_vector)
-        return self.loss(prediction, patches.log_radiance), prediction
+        inputs, target = self._example(patches)
+        prediction = self.network(*inputs)
+        return self.loss(prediction, target), prediction
 
-    def predict(self, buffers: Tensor, scene_vector: Tensor) -> Tensor:
-        """One image: buffers [H, W, C] and v [D] to log1p radiance [H, W, 3] on the CPU."""
+    def predict(self, buffers: Tensor, *inputs: Tensor) -> Tensor:
+        """One image: buffers [H, W, C] and `Samples.test_inputs` to log1p radiance [H, W, 3].
+
+        On the CPU, wherever the network is.
+        """
+        on_device = (tensor.to(self.device) for tensor in (buffers, *inputs))
         with torch.no_grad(), self.trainer.precision_plugin.forward_context():
-            output = self.network.render(buffers.to(self.device), scene_vector.to(self.device))  # type: ignore[operator]
+            output = self.network.render(*on_device)  # type: ignore[operator]
         return output.float().cpu()
 
     def signals(self, patches: Patches, target: Target) -> Signals:
@@ -89,7 +99,13 @@ class IlluminationModule(LightningModule):
             return self._scorer_of(target).signals(patches.to(self.device), self._optimizer())
 
     def _scorer_of(self, target: Target) -> Scorer:
-        return Scorer(target=target, network=self.network, loss=self.loss, clock=self._clock)
+        return Scorer(
+            target=target,
+            network=self.network,
+            loss=self.loss,
+            clock=self._clock,
+            example=self._example,
+        )
 
     def _optimizer(self) -> torch.optim.Optimizer:
         optimizer = self.optimizers(use_pl_optimizer=False)

@@ -17,6 +17,7 @@ from torch import Tensor, nn
 
 from ngi.explore import Signals, Target
 from ngi.learn.clock import PhaseClock
+from ngi.learn.samples import Example
 from ngi.models import (
     SampleLoss,
     adam_step_norm,
@@ -31,10 +32,19 @@ current states, [n]."""
 
 
 class Scorer:
-    """Evaluates `target` under the present weights (paper, Sec. 5.1)."""
+    """Evaluates `target` under the present weights (paper, Sec. 5.1).
+
+    example: see `Samples.example`
+    """
 
     def __init__(
-        self, *, target: Target, network: nn.Module, loss: SampleLoss, clock: PhaseClock
+        self,
+        *,
+        target: Target,
+        network: nn.Module,
+        loss: SampleLoss,
+        clock: PhaseClock,
+        example: Callable[[Patches], Example],
     ) -> None:
         unknown = target.requires - {field.name for field in fields(Signals)}
         if unknown:
@@ -46,6 +56,7 @@ class Scorer:
         self._network = network
         self._loss = loss
         self._clock = clock
+        self._example = example
 
     @contextmanager
     def watch(
@@ -79,30 +90,24 @@ class Scorer:
         step_norms: Callable[[], Tensor | None],
     ) -> Scores:
         with self._clock.phase("score"):
-            gradients = self._output_gradients(proposed, output)
+            gradients = self._output_gradients(output, self._example(proposed)[1])
             of_current = self._target(self.signals(current, optimizer))
         return lambda: self._target(Signals(losses, gradients, step_norms())), of_current
 
     def signals(self, patches: Patches, optimizer: torch.optim.Optimizer) -> Signals:
         """What the network says about [n] patches as they are: in a pass of their own."""
         losses = norms = gradients = None
+        inputs, target = self._example(patches)
         if "step_norm" in self._target.requires:
-            losses, norms = adam_step_norm(
-                self._network,
-                self._loss,
-                optimizer,
-                patches.buffers,
-                patches.scene_vector,
-                patches.log_radiance,
-            )
+            losses, norms = adam_step_norm(self._network, self._loss, optimizer, inputs, target)
         if losses is None or "output_gradient_norm" in self._target.requires:
             with torch.no_grad():
-                output = self._network(patches.buffers, patches.scene_vector)
-                losses = self._loss(output, patches.log_radiance)
-            gradients = self._output_gradients(patches, output)
+                output = self._network(*inputs)
+                losses = self._loss(output, target)
+            gradients = self._output_gradients(output, target)
         return Signals(losses, gradients, norms)
 
-    def _output_gradients(self, patches: Patches, output: Tensor) -> Tensor | None:
+    def _output_gradients(self, output: Tensor, target: Tensor) -> Tensor | None:
         if "output_gradient_norm" not in self._target.requires:
             return None
-        return output_gradient_norm(output, patches.log_radiance, self._loss)
+        return output_gradient_norm(output, target, self._loss)

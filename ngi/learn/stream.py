@@ -22,7 +22,7 @@ from ngi.learn.ahead import ProposalsAhead
 from ngi.learn.batch import Batch, Counters, Feedback
 from ngi.learn.chain_trace import chain_record
 from ngi.learn.clock import PhaseClock
-from ngi.render.protocol import Renderer
+from ngi.learn.samples import Samples
 from ngi.reuse import PatchArchive, PatchStore, ReusePolicy
 
 ENDLESS = 2**31
@@ -38,7 +38,7 @@ log = logging.getLogger(__name__)
 
 
 class TrainingStream(IterableDataset[Batch]):
-    """Endless batches of `sampler.chains` patches.
+    """Endless batches of `sampler.chains` samples.
 
     The chains propose at the first batch and at each that follows a generated one; patches have the
     resolution of the iteration at which they were proposed.
@@ -48,14 +48,14 @@ class TrainingStream(IterableDataset[Batch]):
     when_late: what to do where a new batch is due that is not rendered yet: 'wait' for it, or
         'reuse' stored patches until it is, which makes the batches depend on the machine's speed.
         Where the policy would never reuse, as in the bootstrap, it is waited for all the same.
-    Raises ValueError where the schedule's first image is smaller than a patch, or the store than
-    two batches, and for an unknown `when_late`.
+    Raises ValueError where samples cannot be cut from the schedule's first or last image, where
+    the store is smaller than two batches, and for an unknown `when_late`.
     """
 
     def __init__(
         self,
         *,
-        renderer: Renderer,
+        samples: Samples,
         sampler: MarkovChains,
         store: PatchStore,
         archive: PatchArchive,
@@ -66,11 +66,8 @@ class TrainingStream(IterableDataset[Batch]):
         when_late: str,
     ) -> None:
         super().__init__()
-        if schedule.resolution(0) < renderer.patch_size:
-            raise ValueError(
-                f"resolution: the image has {schedule.resolution(0)} pixels a side, less than a "
-                f"patch of {renderer.patch_size}; raise resolution or lower renderer.patch_size"
-            )
+        for iteration in (0, ENDLESS):
+            samples.check_resolution(schedule.resolution(iteration))
         if store.capacity < 2 * sampler.chains:
             raise ValueError(
                 f"reuse.store.capacity: {store.capacity} patches do not hold the chains' current "
@@ -87,14 +84,14 @@ class TrainingStream(IterableDataset[Batch]):
         self.reuse_probability = 0.0
         self.chain_record: dict[str, np.ndarray] | None = None  # of a generated batch
         self._chain_info: ChainInfo | None = None
-        self._renderer = renderer
+        self._samples = samples
         self._archive = archive
         self._policy = policy
         self._schedule = schedule
         self._clock = clock
         self._when_late = when_late
         self._generator = torch.Generator().manual_seed(seed)
-        self._chains: ChainState = sampler.init(renderer.dimensions + 2)
+        self._chains: ChainState = sampler.init(samples.dimensions + 2)
         self._policy_state = policy.init()
         self._resolution = schedule.resolution(0)  # of the latest proposals
         self._ahead: ProposalsAhead | None = None
@@ -206,7 +203,8 @@ class TrainingStream(IterableDataset[Batch]):
             draw = torch.rand((), generator=self._generator, dtype=torch.float64)
             if draw < self.reuse_probability or self._postpone(ahead):
                 ids = self.store.draw(self.sampler.chains, self._generator)
-                return Batch(self.store.get(ids), ids, generated=False, current=None)
+                patches = self._samples.rearranged(self.store.get(ids), self._generator)
+                return Batch(patches, ids, generated=False, current=None)
         return self._generate(ahead)
 
     def _propose(self) -> ProposalsAhead:
@@ -223,7 +221,7 @@ class TrainingStream(IterableDataset[Batch]):
                 )
         self._resolution = self._ahead.resolution
         with self._clock.phase("render"):
-            self._ahead.start(self._renderer)
+            self._ahead.start(self._samples)
         return self._ahead
 
     def _postpone(self, ahead: ProposalsAhead) -> bool:

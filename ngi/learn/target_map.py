@@ -11,8 +11,8 @@ from torch.quasirandom import SobolEngine
 from tqdm import tqdm
 
 from ngi.explore import Signals, Target
+from ngi.learn.samples import Samples
 from ngi.patches import Patches
-from ngi.render.protocol import Renderer
 from ngi.reuse import CompactPatches
 
 PATCHES_AT_ONCE = 16
@@ -51,12 +51,12 @@ class TargetMap:
         positions_per_cell: int,
         target: Target,
         resolution: int,
-        renderer: Renderer,
+        samples: Samples,
         signals: SignalsOf,
     ) -> None:
-        if renderer.dimensions != 2:
+        if samples.dimensions != 2:
             raise ValueError(
-                f"evaluation.target_map: the scene has {renderer.dimensions} variables, a map "
+                f"evaluation.target_map: the scene has {samples.dimensions} variables, a map "
                 "needs 2; choose scene=mirror, or evaluation.target_map=null"
             )
         for name, count in (("cells", cells), ("positions_per_cell", positions_per_cell)):
@@ -65,7 +65,7 @@ class TargetMap:
         self._states = map_states(cells, positions_per_cell)
         self._target = target
         self._resolution = resolution
-        self._renderer = renderer
+        self._samples = samples
         self._signals = signals
         self._patches: list[CompactPatches] = []
 
@@ -90,7 +90,8 @@ class TargetMap:
         }
 
     def _render(self, states: Tensor, *, seed: int) -> CompactPatches:
-        rendered = self._renderer.render_patches(states, resolution=self._resolution, seed=seed)
+        job = self._samples.start_patches(states, resolution=self._resolution, seed=seed)
+        rendered = job.result()
         patches = Patches(
             scene_vector=states[:, :-2],
             position=states[:, -2:],
@@ -99,7 +100,7 @@ class TargetMap:
             buffers=rendered.buffers,
             log_radiance=rendered.log_radiance,
         )
-        return CompactPatches.compress(patches, self._renderer.layout)
+        return CompactPatches.compress(patches, self._samples.layout)
 
     def _grid(self, parts: list[Tensor]) -> np.ndarray:
         return torch.cat(parts).float().numpy(force=True).reshape(self._states.shape[:-1])

@@ -32,8 +32,7 @@ def adam_step_norm(
     model: nn.Module,
     loss: SampleLoss,
     optimizer: torch.optim.Optimizer,
-    buffers: Tensor,
-    scene_vector: Tensor,
+    inputs: tuple[Tensor, ...],
     target: Tensor,
 ) -> tuple[Tensor, Tensor]:
     """Loss of each sample, [n], and norm of the Adam step that it alone would cause, [n].
@@ -45,7 +44,7 @@ def adam_step_norm(
 
     model: a network all of whose parameters belong to `PatchLinear` layers, each called once
     optimizer: `torch.optim.Adam` over all parameters of the model
-    buffers, scene_vector: the network's input, [n, P, P, C] and [n, D]
+    inputs: the network's arguments, such as buffers [n, P, P, C] and v [n, D]
     target: [n, P, P, 3] log1p radiance as rendered
 
     All samples share one forward pass and one backward pass for the gradients at the layers'
@@ -57,9 +56,9 @@ def adam_step_norm(
     supported and for an optimiser that does not hold all parameters.
     """
     with step_norms_in_backward(model, optimizer) as step_norms, torch.enable_grad():
-        losses = loss(model(buffers, scene_vector), target)
+        losses = loss(model(*inputs), target)
         total = losses.sum()
-    with torch.autocast(buffers.device.type, enabled=False):
+    with torch.autocast(target.device.type, enabled=False):
         torch.autograd.grad(total, [layer.bias for layer in _patch_linear_layers(model)])
     return losses.detach(), step_norms()
 

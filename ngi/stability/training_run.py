@@ -14,7 +14,7 @@ from omegaconf import DictConfig
 from torch import Tensor
 
 from ngi import learn
-from ngi.build import build_module, build_stream
+from ngi.build import build_module, build_samples, build_stream
 from ngi.exploration_map.test_set import TestSet
 from ngi.learn.lightning_api import Callback, Trainer
 from ngi.learn.step_guard import REPORT
@@ -107,8 +107,9 @@ def _fit(
     steps: int,
 ) -> None:
     clock = learn.PhaseClock()
-    stream = build_stream(config, renderer=renderer, clock=clock, patches=folder)
-    module = build_module(config, renderer=renderer, target=stream.sampler.target, clock=clock)
+    samples = build_samples(config, renderer=renderer)
+    stream = build_stream(config, samples=samples, clock=clock, patches=folder)
+    module = build_module(config, samples=samples, target=stream.sampler.target, clock=clock)
     guard = learn.StepGuard(stream=stream, folder=folder)
     watch = _Watch(stream, guard, disturbances, trained)
     module.loss = watch.disturbed_loss(module.loss)

@@ -14,6 +14,7 @@ from ngi.options import option, run_tool
 if TYPE_CHECKING:
     from torch import Tensor
 
+    from ngi.models import PixelGenerator
     from ngi.view.trained_run import TrainedRun
 
 SUFFIX = ".onnx"
@@ -51,6 +52,7 @@ def export(options: ExportOptions) -> None:
     if missing := [name for name in PACKAGES if find_spec(name) is None]:
         raise ValueError(f"{', '.join(missing)} missing: pip install -e .[export]")
     from ngi.durable import write_atomically
+    from ngi.models import PixelGenerator
     from ngi.view.network_file import network_file
     from ngi.view.network_metadata import network_metadata
     from ngi.view.trained_run import TrainedRun
@@ -59,20 +61,25 @@ def export(options: ExportOptions) -> None:
         Path(options.run), scene_path=None if options.scene is None else Path(options.scene)
     )
     with closing(run.renderer):
+        if not isinstance(run.network, PixelGenerator):
+            raise ValueError(
+                f"run: its network is a {type(run.network).__name__}, which needs more of a frame "
+                "than buffers and v; a PixelGenerator can be exported"
+            )
         content = network_file(run.network, network_metadata(run))
-        differences = _checked(content, run)
+        differences = _checked(content, run.network, run)
     write_atomically(out, content)
     print(f"step {run.step}, {len(content) / 2**20:.1f} MiB; {out}")
     print(f"largest difference from the network, relative to 1 + radiance: {differences}")
 
 
-def _checked(content: bytes, run: TrainedRun) -> str:
+def _checked(content: bytes, network: PixelGenerator, run: TrainedRun) -> str:
     """The largest differences between file and network; ValueError where one is too large."""
     from ngi.view.network_file import largest_difference
 
     shown = []
     for name, (buffers, v) in _inputs(run).items():
-        difference = largest_difference(content, run.network, buffers, v)
+        difference = largest_difference(content, network, buffers, v)
         if not difference <= TOLERANCE:  # NaN is too large
             raise ValueError(
                 f"the exported network differs from the one of the run by {difference:.2g} of "

@@ -16,7 +16,7 @@ import viser
 from torch import Tensor
 
 from ngi.evaluate import EvaluationProtocol
-from ngi.learn import IlluminationModule, PhaseClock, RunFolder, TrainingStream
+from ngi.learn import IlluminationModule, PhaseClock, RunFolder, Samples, TrainingStream
 from ngi.learn.lightning_api import Callback
 from ngi.render import Renderer
 from ngi.scene import SceneDescription
@@ -52,6 +52,7 @@ class LiveView(Callback):
         *,
         page: Page,
         studio: Studio,
+        samples: Samples,
         stream: TrainingStream,
         folder: RunFolder,
         clock: PhaseClock,
@@ -59,6 +60,7 @@ class LiveView(Callback):
     ) -> None:
         self._page = page
         self._studio = studio
+        self._samples = samples
         self._stream = stream
         self._folder = folder
         self._clock = clock
@@ -108,7 +110,7 @@ class LiveView(Callback):
             visited=Visited(
                 torch.cat([empty, *states]), torch.cat([torch.empty(0), *densities]), current
             ),
-            patches=store.get(ids).log_radiance,
+            patches=self._samples.example(store.get(ids))[1],
             losses=losses.tolist(),
         )
 
@@ -116,6 +118,7 @@ class LiveView(Callback):
 def live_view(
     *,
     renderer: Renderer,
+    samples: Samples,
     module: IlluminationModule,
     stream: TrainingStream,
     folder: RunFolder,
@@ -136,12 +139,17 @@ def live_view(
         renderer=renderer,
         protocol=protocol,
     )
-    studio = Studio(renderer=renderer, predict=module.predict)
+
+    def predict(buffers: Tensor, v: Tensor) -> Tensor:
+        return module.predict(buffers, *samples.test_inputs(v, resolution=len(buffers)))
+
+    studio = Studio(renderer=renderer, predict=predict)
     page = Page(studio, about, resolution=protocol.resolution, host="127.0.0.1", port=port)
     log.info("%s shows the training", page.address)
     return LiveView(
         page=page,
         studio=studio,
+        samples=samples,
         stream=stream,
         folder=folder,
         clock=clock,

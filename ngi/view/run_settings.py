@@ -10,6 +10,7 @@ from typing import Any
 from hydra.utils import get_object
 from omegaconf import DictConfig, OmegaConf
 
+from ngi.learn import PatchSamples, Samples
 from ngi.render import Renderer
 from ngi.render.workers import mitsuba_renderer
 from ngi.resources import root
@@ -45,6 +46,14 @@ def made_by(settings: dict[str, Any], group: str) -> Callable[..., Any]:
             "names; only what comes with this program is opened"
         )
     return get_object(target)
+
+
+def make_samples(settings: dict[str, Any], renderer: Renderer) -> Samples:
+    """What was trained on; patches, where the run is older than the group `data`."""
+    if "data" not in settings:
+        return PatchSamples(renderer=renderer)
+    samples: Samples = made_by(settings, "data")(**plain(settings["data"]), renderer=renderer)
+    return samples
 
 
 def plain(arguments: dict[str, Any]) -> dict[str, Any]:

@@ -7,15 +7,21 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from ngi.durable import DamagedError
 from ngi.evaluate import EvaluationProtocol
-from ngi.learn import read_checkpoint
-from ngi.models import PixelGenerator
+from ngi.learn import Samples, read_checkpoint
 from ngi.render import Renderer
 from ngi.scene import SceneDescription
-from ngi.view.run_settings import describe_scene, made_by, make_renderer, plain, read_settings
+from ngi.view.run_settings import (
+    describe_scene,
+    made_by,
+    make_renderer,
+    make_samples,
+    plain,
+    read_settings,
+)
 
 CHECKPOINTS = ("last.ckpt", "previous.ckpt")
 NETWORK = "network."
@@ -30,6 +36,7 @@ class TrainedRun:
     precision: as Lightning names that of training, which is that of `predict` too
     protocol: that its evaluations measured by
     description: of its scene; None for closed formulas
+    samples: what the network was trained on, which says what it is given
     """
 
     folder: Path
@@ -39,7 +46,8 @@ class TrainedRun:
     protocol: EvaluationProtocol
     description: SceneDescription | None
     renderer: Renderer
-    network: PixelGenerator
+    samples: Samples
+    network: nn.Module
 
     @classmethod
     def open(cls, folder: Path, *, scene_path: Path | None = None) -> TrainedRun:
@@ -54,10 +62,11 @@ class TrainedRun:
         checkpoint = _newest(folder)
         description = describe_scene(settings, scene_path)
         renderer = make_renderer(folder, settings, description)
+        samples = make_samples(settings, renderer)
         network = made_by(settings, "model")(
             **plain(settings["model"]),
-            layout=renderer.layout,
-            scene_dimensions=renderer.dimensions,
+            layout=samples.layout,
+            scene_dimensions=samples.dimensions,
         )
         weights = {
             name.removeprefix(NETWORK): value
@@ -74,6 +83,7 @@ class TrainedRun:
             protocol=EvaluationProtocol(**plain(settings["evaluation"]["evaluator"]["protocol"])),
             description=description,
             renderer=renderer,
+            samples=samples,
             network=network.to(device).eval(),
         )
 
@@ -81,8 +91,10 @@ class TrainedRun:
         """Buffers [H, W, C] and v [D] in [0, 1] to log1p of linear RGB [H, W, 3], on the CPU."""
         device = next(self.network.parameters()).device
         reduced = self.precision == "bf16-mixed"
+        inputs = self.samples.test_inputs(scene_vector, resolution=len(buffers))
+        on_device = (tensor.to(device) for tensor in (buffers, *inputs))
         with torch.autocast(device.type, dtype=torch.bfloat16, enabled=reduced):
-            output = self.network.render(buffers.to(device), scene_vector.to(device))
+            output: Tensor = self.network.render(*on_device)  # type: ignore[operator]
         return output.float().cpu()
 
     def radiance(self, scene_vector: Tensor, *, resolution: int) -> Tensor:

@@ -1,4 +1,5 @@
 from ngi.benchmark.step_costs import TimedStep, rendering_seconds, step_seconds
+from ngi.learn import PatchSamples
 from ngi.learn.clock import PHASES
 from ngi.render import AnalyticRenderer
 
@@ -46,7 +47,7 @@ def test_rendering_is_timed_at_new_states_of_the_whole_scene() -> None:
             return super().render_patches(states, resolution=resolution, seed=seed)
 
     renderer = Renderer(dimensions=2, patch_size=8)
-    seconds = rendering_seconds(renderer, patches=4, seconds=0.0)
+    seconds = rendering_seconds(PatchSamples(renderer=renderer), count=4, seconds=0.0)
     assert len(seconds["render"]) == 3
     assert len(asked) == 4, "the first is no timing"
     assert all(states.shape == (4, 4) and resolution == 32 for states, resolution in asked)

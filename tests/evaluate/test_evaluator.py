@@ -30,7 +30,13 @@ class NoLpips:
 @pytest.fixture
 def evaluator(renderer, protocol, tmp_path) -> Evaluator:
     cache = ReferenceCache(tmp_path / "references")
-    return Evaluator(renderer=renderer, protocol=protocol, cache=cache, lpips=MeanDistance())
+    return Evaluator(
+        renderer=renderer, test_inputs=v_alone, protocol=protocol, cache=cache, lpips=MeanDistance()
+    )
+
+
+def v_alone(scene_vector: torch.Tensor, *, resolution: int) -> tuple[torch.Tensor]:  # noqa: ARG001
+    return (scene_vector,)
 
 
 def perfect(buffers: torch.Tensor, scene_vector: torch.Tensor) -> torch.Tensor:
@@ -97,7 +103,9 @@ def test_buffers_come_from_the_present_renderer(evaluator, renderer, protocol, t
         (resolution, resolution, 5), v[0].item()
     )
     cache = ReferenceCache(tmp_path / "references")
-    again = Evaluator(renderer=other, protocol=protocol, cache=cache, lpips=NoLpips())
+    again = Evaluator(
+        renderer=other, test_inputs=v_alone, protocol=protocol, cache=cache, lpips=NoLpips()
+    )
 
     def predict(buffers: torch.Tensor, scene_vector: torch.Tensor) -> torch.Tensor:
         assert torch.equal(buffers, scene_vector[0].expand(33, 33, 5))
@@ -124,6 +132,7 @@ def test_reference_hash_follows_the_references(evaluator, protocol, renderer, tm
         renderer.noise = noise
         other = Evaluator(
             renderer=renderer,
+            test_inputs=v_alone,
             protocol=protocol,
             cache=ReferenceCache(tmp_path / folder),
             lpips=NoLpips(),
@@ -136,7 +145,9 @@ def test_reference_hash_follows_the_references(evaluator, protocol, renderer, tm
 
 def test_without_lpips_its_columns_are_empty(renderer, protocol, tmp_path) -> None:
     cache = ReferenceCache(tmp_path)
-    evaluator = Evaluator(renderer=renderer, protocol=protocol, cache=cache, lpips=NoLpips())
+    evaluator = Evaluator(
+        renderer=renderer, test_inputs=v_alone, protocol=protocol, cache=cache, lpips=NoLpips()
+    )
     evaluation = evaluator.evaluate(perfect)
     assert evaluation.row()["hard_lpips"] is None
     assert evaluation.row()["uniform_lpips_worst5"] is None
@@ -226,7 +237,9 @@ def test_references_above_the_noise_level_are_reported_once(
 ) -> None:
     demanding = dataclasses.replace(protocol, target_noise=target_noise)
     cache = ReferenceCache(tmp_path / "references")
-    evaluator = Evaluator(renderer=renderer, protocol=demanding, cache=cache, lpips=NoLpips())
+    evaluator = Evaluator(
+        renderer=renderer, test_inputs=v_alone, protocol=demanding, cache=cache, lpips=NoLpips()
+    )
     with caplog.at_level("INFO"):
         evaluator.prepare()
     lines = [r for r in caplog.records if "references stayed above" in r.getMessage()]

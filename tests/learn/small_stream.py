@@ -15,6 +15,7 @@ from ngi.explore import (
 )
 from ngi.learn.batch import Batch, Feedback
 from ngi.learn.clock import PhaseClock
+from ngi.learn.samples import PatchSamples
 from ngi.learn.stream import TrainingStream
 from ngi.render import AnalyticRenderer
 from ngi.reuse import FixedProbability, PatchArchive, PatchStore, ReusePolicy
@@ -40,7 +41,7 @@ def make(
 ) -> TrainingStream:
     renderer = renderer or AnalyticRenderer(dimensions=3, patch_size=8)
     return TrainingStream(
-        renderer=renderer,
+        samples=PatchSamples(renderer=renderer),
         sampler=MarkovChains(
             chains=CHAINS,
             proposal=NormalPerturbation(large_step_probability=0.3, standard_deviation=0.05),

@@ -21,10 +21,9 @@ from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from ngi import learn
-from ngi.build import build_module, build_stream, run_costs
+from ngi.build import build_module, build_samples, build_stream, run_costs
 from ngi.config_values import check_values
 from ngi.learn.callbacks import callbacks
-from ngi.patches import Patches
 from ngi.train import MESSAGES
 from tests.learn.composition import run_config
 
@@ -91,9 +90,10 @@ def build(config: DictConfig, folder: Path) -> None:
     budget, renderer = instantiate(config.budget), instantiate(config.renderer)
     run_costs(config, budget=budget, renderer=renderer)
     clock = learn.PhaseClock()
-    stream = build_stream(config, renderer=renderer, clock=clock, patches=folder)
-    module = build_module(config, renderer=renderer, target=stream.sampler.target, clock=clock)
-    instantiate(config.evaluation.evaluator)(renderer=renderer)
+    samples = build_samples(config, renderer=renderer)
+    stream = build_stream(config, samples=samples, clock=clock, patches=folder)
+    module = build_module(config, samples=samples, target=stream.sampler.target, clock=clock)
+    instantiate(config.evaluation.evaluator)(renderer=renderer, test_inputs=samples.test_inputs)
     callbacks(
         stream=stream,
         clock=clock,
@@ -108,14 +108,7 @@ def build(config: DictConfig, folder: Path) -> None:
         interruption=learn.Interruption(of="test"),
     )
     module.configure_optimizers()
-    module.rehearse(
-        Patches.blank(
-            2,
-            layout=renderer.layout,
-            dimensions=renderer.dimensions,
-            patch_size=renderer.patch_size,
-        )
-    )
+    module.rehearse(samples.blank(2))
 
 
 def problem(variant: int, changes: dict[str, Any], folder: Path) -> str | None:

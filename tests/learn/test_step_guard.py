@@ -14,7 +14,14 @@ import torch
 from torch import Tensor
 
 from ngi.explore import LossTimesStep
-from ngi.learn import ExplorationDataModule, IlluminationModule, PhaseClock, StepGuard, seeded
+from ngi.learn import (
+    ExplorationDataModule,
+    IlluminationModule,
+    PatchSamples,
+    PhaseClock,
+    StepGuard,
+    seeded,
+)
 from ngi.learn.lightning_api import Callback, Trainer
 from ngi.learn.step_guard import LARGEST_NORM, REFUSED_IN_A_ROW
 from ngi.learn.stream import TrainingStream
@@ -76,6 +83,7 @@ def train(
         optimizer=lambda parameters: torch.optim.Adam(parameters, lr=1e-2),
         target=LossTimesStep(),
         clock=PhaseClock(),
+        example=PatchSamples.example,
     )
     count = iter(range(1, steps + 1))
     module.network.output_layer.weight.register_hook(lambda g: gradient(next(count), g))

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from ngi.explore import Loss, Signals, Target
-from ngi.learn import TargetMap
+from ngi.learn import PatchSamples, TargetMap
 from ngi.learn.target_map import map_states
 from ngi.models import L1Dssim, PixelGenerator
 from ngi.patches import Patches
@@ -29,7 +29,7 @@ def target_map(
         positions_per_cell=positions,
         target=Loss(),
         resolution=32,
-        renderer=AnalyticRenderer(dimensions=dimensions, patch_size=16),
+        samples=PatchSamples(renderer=AnalyticRenderer(dimensions=dimensions, patch_size=16)),
         **options,
     )
 

@@ -32,7 +32,7 @@ def train(model, optimizer, batch, steps) -> None:
 
 
 def step_norms(model, optimizer, batch, loss=LOSS):
-    return adam_step_norm(model, loss, optimizer, batch.buffers, batch.scene_vector, batch.target)
+    return adam_step_norm(model, loss, optimizer, (batch.buffers, batch.scene_vector), batch.target)
 
 
 def watched_layers(model) -> list[nn.Module]:
