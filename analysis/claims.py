@@ -13,6 +13,7 @@ SEVEN_SCENES = (
     "spaceship",
     "veach-egg",
 )
+CNSR_SCENES = ("living-room", "bedroom", "veach-door")
 SALONS = ("salon-5", "salon-7", "salon-9", "salon-10", "salon-25")
 
 
@@ -150,7 +151,10 @@ CLAIMS = (
         statement="At the same quality training takes a fraction of CNSR's time; after the same "
         "time the error is lower.",
         source="Sec. 7.2.2; Fig. 12",
-        built=False,
+        comparisons=(
+            Comparison(CNSR_SCENES, "active_exploration", "cnsr"),
+            Comparison(CNSR_SCENES, "uniform", "cnsr", decides=False),
+        ),
     ),
     Claim(
         id="anf",

@@ -20,6 +20,7 @@ TITLES = {
     "constant_resolution": "exploration at constant resolution",
     "uniform_growing": "uniform sampling with growing resolution",
     "traced_specular": "traced specular bounces",
+    "cnsr": "CNSR",
     "path_tracing": "path tracing, same time per frame",
     "path_tracing_oidn": "path tracing + Open Image Denoise, same time per frame",
     "path_tracing_optix": "path tracing + OptiX denoiser, same time per frame",

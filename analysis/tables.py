@@ -11,11 +11,18 @@ from tabulate import tabulate
 from analysis.methods import title as method_title
 from analysis.runs import METRICS, SETS
 from analysis.statistics import Estimate
-from analysis.summary import COSTS, Comparison, Summary
+from analysis.summary import COSTS, FRAME_COSTS, Comparison, Summary
 
 TITLES = {"mape": "MAPE", "dssim": "DSSIM", "mae": "MAE", "lpips": "LPIPS"}
 COST_TITLES = dict(
-    zip(COSTS, ("steps", "patches traced", "paths traced", "run seconds"), strict=True)
+    zip(
+        (*COSTS, *FRAME_COSTS),
+        (
+            *("steps", "patches traced", "paths traced", "run seconds"),
+            *("ms per frame: inputs", "network"),
+        ),
+        strict=True,
+    )
 )
 MISSING = "–"
 
@@ -51,7 +58,7 @@ def worst_table(summaries: Sequence[Summary], sets: Sequence[str] = SETS) -> Tab
 
 
 def cost_table(summaries: Sequence[Summary]) -> Table:
-    """What the runs took, mean over seeds."""
+    """What the runs took, and what a test frame takes beside its buffers; means over seeds."""
     methods = [summary for summary in summaries if summary.is_method]
     return _table("Cost", methods, COST_TITLES, lambda value: f"{value.mean:,.0f}", mark_best=False)
 

@@ -12,11 +12,15 @@ from omegaconf import DictConfig
 from ngi.explore import MarkovChains
 from ngi.models import PixelGenerator
 from ngi.patches import BufferLayout
+from ngi.render import AnalyticRenderer
 from ngi.resources import root, scene_folders
 from ngi.train import register
 
 CONF = root() / "conf"
-GROUPS = ("sampler", "reuse", "resolution", "model", "loss", "optimizer", "budget", "tracker")
+GROUPS = (
+    *("sampler", "reuse", "resolution", "data", "model"),
+    *("loss", "optimizer", "budget", "tracker"),
+)
 OPTIONS = [(g, f.stem) for g in GROUPS for f in sorted((CONF / g).glob("*.yaml"))]
 
 
@@ -42,6 +46,8 @@ def test_every_option_builds(group: str, option: str) -> None:
     if group in ("model", "reuse"):
         arguments = {"scene_dimensions": 3} if group == "model" else {}
         built = built(layout=BufferLayout(), **arguments)
+    if group == "data":
+        built = built(renderer=AnalyticRenderer(dimensions=3, patch_size=16))
     assert built is not None
 
 
@@ -72,6 +78,8 @@ def test_the_defaults_are_the_papers() -> None:
 
 
 PRECONDITIONED, PLAIN = "pixel_generator", "pixel_generator_no_preconditioning"
+COMPETITORS = ("cnsr",)
+"""Other methods, whose samples are of another size."""
 METHODS = {  # sampler, resolution, model, specular
     "active_exploration": ("mcmc_loss_step", "growing", PRECONDITIONED, "learned"),
     "uniform": ("uniform", "constant", PRECONDITIONED, "learned"),
@@ -81,6 +89,7 @@ METHODS = {  # sampler, resolution, model, specular
     "output_gradient_target": ("mcmc_output_gradient", "growing", PRECONDITIONED, "learned"),
     "metropolis": ("mcmc_metropolis", "growing", PRECONDITIONED, "learned"),
     "no_preconditioning": ("mcmc_loss_step", "growing", PLAIN, "learned"),
+    "cnsr": ("uniform", "constant", "cnsr", "learned"),
     "traced_specular": ("mcmc_loss_step", "growing", PRECONDITIONED, "traced"),
 }
 
@@ -117,8 +126,19 @@ def test_a_method_differs_where_its_name_says_and_nowhere_else(method: str) -> N
     assert found == METHODS[method]
     assert config.label.method == method
     other = composed("budget=small")
-    for part in ("scene", "reuse", "loss", "optimizer", "budget", "evaluation", "trainer"):
+    for part in ("scene", "loss", "optimizer", "budget", "evaluation", "trainer"):
         assert config[part] == other[part], part
+    if method not in COMPETITORS:
+        assert (config.data, config.reuse) == (other.data, other.reuse)
+
+
+def test_the_store_of_a_competitor_holds_as_many_pixels() -> None:
+    config, other = composed("method=cnsr"), composed("method=uniform")
+    images = 1 + config.data.observations
+    pixels = images * config.renderer.patch_size**2 * config.reuse.store.capacity
+    assert pixels == other.renderer.patch_size**2 * other.reuse.store.capacity
+    assert {**config.reuse.policy, "bootstrap_batches": 100} == other.reuse.policy
+    assert config.resolution.start == config.renderer.patch_size == 64
 
 
 BUDGETS = ("smoke", "small", "paper")
@@ -152,8 +172,7 @@ def test_every_sweep_of_the_paper_is_there_at_every_budget(sweep: str, budget: s
         assert config.label.method == method
         for part in (config.sampler, config.reuse.policy, config.resolution, config.budget):
             instantiate(part)
-        network = instantiate(config.model)(layout=BufferLayout(), scene_dimensions=3)
-        assert isinstance(network, PixelGenerator)
+        assert instantiate(config.model)(layout=BufferLayout(), scene_dimensions=3) is not None
 
 
 def test_runs_that_two_sweeps_need_are_one_run() -> None:

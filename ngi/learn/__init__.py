@@ -10,6 +10,7 @@ from ngi.learn.datamodule import ExplorationDataModule
 from ngi.learn.interruption import Interrupted, Interruption
 from ngi.learn.model_clock import ModelClock
 from ngi.learn.module import IlluminationModule, seeded
+from ngi.learn.observation_sets import ObservationSets
 from ngi.learn.record_log import RecordLog
 from ngi.learn.recorder import Recorder
 from ngi.learn.row_log import RowLog
@@ -39,6 +40,7 @@ __all__ = [
     "Interruption",
     "Local",
     "ModelClock",
+    "ObservationSets",
     "PatchArchive",
     "PatchSamples",
     "PhaseClock",

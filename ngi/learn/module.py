@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from inspect import signature
 from typing import Any, TypeVar
 
 import torch
@@ -57,9 +58,11 @@ class IlluminationModule(LightningModule):
     def rehearse(self, patches: Patches) -> None:
         """Makes a training step's computations without training, before any long work.
 
-        Raises what would otherwise be raised at the first steps: patches smaller than the loss's
-        window, an optimiser or a network that the target can not score, a wrong learning rate.
+        Raises what would otherwise be raised at the first steps: samples that are not what the
+        network takes, patches smaller than the loss's window, an optimiser or a network that the
+        target can not score, a wrong learning rate.
         """
+        self._check_inputs(patches)
         optimizer = self._make_optimizer(self.network.parameters())
         with self._scorer.watch(patches, patches, optimizer) as score:
             losses, prediction = self._losses(patches)
@@ -97,6 +100,18 @@ class IlluminationModule(LightningModule):
         """
         with self.trainer.precision_plugin.forward_context():
             return self._scorer_of(target).signals(patches.to(self.device), self._optimizer())
+
+    def _check_inputs(self, patches: Patches) -> None:
+        inputs, _ = self._example(patches)
+        takes = signature(self.network.forward)
+        try:
+            takes.bind(*inputs)
+        except TypeError as error:
+            raise ValueError(
+                f"model and data do not fit: {type(self.network).__name__} takes "
+                f"{list(takes.parameters)}, the samples give {len(inputs)} tensors; a method, "
+                "method=uniform or method=cnsr, chooses both"
+            ) from error
 
     def _scorer_of(self, target: Target) -> Scorer:
         return Scorer(

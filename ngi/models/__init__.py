@@ -1,5 +1,6 @@
 """The neural renderer, its loss, and what it says about single samples. PyTorch only."""
 
+from ngi.models.cnsr import CNSR
 from ngi.models.image_layers import ImageLinear
 from ngi.models.loss import L1Dssim, SampleLoss
 from ngi.models.patch_linear import PatchLinear
@@ -11,6 +12,7 @@ from ngi.models.sample_signals import (
 )
 
 __all__ = [
+    "CNSR",
     "ImageLinear",
     "L1Dssim",
     "PatchLinear",

@@ -30,6 +30,7 @@ class ClosedFormRenderer(ABC):
     """
 
     description = "closed formulas, PyTorch"
+    camera_part = slice(0, 0)
 
     def __init__(
         self,
@@ -105,6 +106,10 @@ class ClosedFormRenderer(ABC):
         """See `ngi.render.Renderer.image_buffers`."""
         buffers, _ = self.whole_image(scene_vector, resolution)
         return buffers
+
+    def cameras(self, scene_vectors: Tensor) -> Tensor:
+        """See `ngi.render.Renderer.cameras`."""
+        return torch.zeros(len(scene_vectors), 6)
 
     def close(self) -> None:  # noqa: B027
         """Nothing works elsewhere."""

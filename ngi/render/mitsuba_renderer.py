@@ -101,6 +101,7 @@ class MitsubaRenderer:
         self.patch_size = patch_size
         self.samples_per_pixel = samples_per_pixel or scene.samples_per_pixel
         self._passes = passes(self.samples_per_pixel, patch_size**2)
+        self.camera_part = scene.camera_part
         self.scene_hash = scene.scene_hash
         self.description = describe(self._variant)
 
@@ -179,6 +180,10 @@ class MitsubaRenderer:
         mi.set_variant(self._variant)
         self._scene.apply(scene_vector)
         return self._encode(self._whole_buffers(resolution)).cpu()
+
+    def cameras(self, scene_vectors: Tensor) -> Tensor:
+        """See `ngi.render.Renderer.cameras`."""
+        return torch.from_numpy(self._scene.description.cameras(scene_vectors.numpy())).float()
 
     def hard_frames(self) -> Tensor:
         """[10, D]: the scene's hard test frames (paper, Sec. 7.2.1)."""

@@ -68,6 +68,8 @@ class Renderer(Protocol):
     """P, pixels along a patch's side."""
     samples_per_pixel: int
     """spp of training patches."""
+    camera_part: slice
+    """The components of v that place the camera; empty where none does."""
     scene_hash: str
     """Content hash of the scene's files; part of a run's identity and of a reference's name."""
     description: str
@@ -106,6 +108,14 @@ class Renderer(Protocol):
         """[H, W, C] float32: the first-hit buffers of the same pixels, as `layout` names them.
 
         Without noise, so there is no seed. A pixel with NaN or Inf is zero in all channels.
+        """
+        ...
+
+    def cameras(self, scene_vectors: Tensor) -> Tensor:
+        """[n, 6] float32, for v [n, D]: where the camera stands and where it looks to.
+
+        Its origin, normalised as positions are, and its unit direction in world space; zeros where
+        no component of v places it.
         """
         ...
 

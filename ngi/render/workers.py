@@ -70,6 +70,7 @@ class WorkerRenderer:
         self.dimensions = self._local.dimensions
         self.patch_size = self._local.patch_size
         self.samples_per_pixel = self._local.samples_per_pixel
+        self.camera_part = self._local.camera_part
         self.scene_hash = self._local.scene_hash
         self._workers = workers
         where = "" if cluster is None else f" on the Ray cluster '{cluster}'"
@@ -107,6 +108,10 @@ class WorkerRenderer:
     def image_buffers(self, scene_vector: Tensor, *, resolution: int) -> Tensor:
         """See `ngi.render.Renderer.image_buffers`."""
         return self._local.image_buffers(scene_vector, resolution=resolution)
+
+    def cameras(self, scene_vectors: Tensor) -> Tensor:
+        """See `ngi.render.Renderer.cameras`."""
+        return self._local.cameras(scene_vectors)
 
     def hard_frames(self) -> Tensor:
         """See `ngi.render.Renderer.hard_frames`."""

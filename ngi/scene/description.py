@@ -64,6 +64,31 @@ class SceneDescription:
             yield variable, slice(start, start + count)
             start += count
 
+    @property
+    def camera_part(self) -> slice:
+        """The components of v that place the camera; empty where none does."""
+        return slice(0, 0) if self._view is None else self._view[1]
+
+    def cameras(self, scene_vectors: ArrayLike) -> NDArray[np.float64]:
+        """[n, 6], for v [n, D]: origin of the camera, in units of `bounds`, and unit direction.
+
+        Zeros where no variable places the camera.
+        """
+        vectors = np.asarray(scene_vectors, dtype=np.float64)
+        if self._view is None:
+            return np.zeros((len(vectors), 6))
+        variable, part = self._view
+        views = np.array([variable.value(v[part]) for v in vectors]).reshape(-1, 6)
+        origin, direction = views[:, :3], views[:, 3:] - views[:, :3]
+        low, high = np.array(self.bounds)
+        length = np.linalg.norm(direction, axis=1, keepdims=True)
+        return np.hstack([(origin - low) / (high - low), direction / length])
+
+    @cached_property
+    def _view(self) -> tuple[Variable, slice] | None:
+        """The variable whose value is the camera's origin and target, and its components of v."""
+        return next((found for found in self.parts() if "camera" in found[0].affects), None)
+
     def _checked(self, scene_vector: ArrayLike) -> NDArray[np.float64]:
         v = np.asarray(scene_vector, dtype=np.float64)
         names = self.component_names
