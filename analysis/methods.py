@@ -21,6 +21,7 @@ TITLES = {
     "uniform_growing": "uniform sampling with growing resolution",
     "traced_specular": "traced specular bounces",
     "cnsr": "CNSR",
+    "anf": "path tracing + ANF, 8 spp",
     "path_tracing": "path tracing, same time per frame",
     "path_tracing_oidn": "path tracing + Open Image Denoise, same time per frame",
     "path_tracing_optix": "path tracing + OptiX denoiser, same time per frame",

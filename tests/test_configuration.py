@@ -78,7 +78,7 @@ def test_the_defaults_are_the_papers() -> None:
 
 
 PRECONDITIONED, PLAIN = "pixel_generator", "pixel_generator_no_preconditioning"
-COMPETITORS = ("cnsr",)
+COMPETITORS = ("cnsr", "anf")
 """Other methods, whose samples are of another size."""
 METHODS = {  # sampler, resolution, model, specular
     "active_exploration": ("mcmc_loss_step", "growing", PRECONDITIONED, "learned"),
@@ -90,6 +90,7 @@ METHODS = {  # sampler, resolution, model, specular
     "metropolis": ("mcmc_metropolis", "growing", PRECONDITIONED, "learned"),
     "no_preconditioning": ("mcmc_loss_step", "growing", PLAIN, "learned"),
     "cnsr": ("uniform", "constant", "cnsr", "learned"),
+    "anf": ("uniform", "constant", "anf", "learned"),
     "traced_specular": ("mcmc_loss_step", "growing", PRECONDITIONED, "traced"),
 }
 
@@ -126,10 +127,10 @@ def test_a_method_differs_where_its_name_says_and_nowhere_else(method: str) -> N
     assert found == METHODS[method]
     assert config.label.method == method
     other = composed("budget=small")
-    for part in ("scene", "loss", "optimizer", "budget", "evaluation", "trainer"):
+    parts = ("scene", "optimizer", "budget", "evaluation", "trainer")
+    own = () if method in COMPETITORS else ("data", "reuse", "loss")
+    for part in (*parts, *own):
         assert config[part] == other[part], part
-    if method not in COMPETITORS:
-        assert (config.data, config.reuse) == (other.data, other.reuse)
 
 
 def test_the_store_of_a_competitor_holds_as_many_pixels() -> None:
@@ -139,6 +140,14 @@ def test_the_store_of_a_competitor_holds_as_many_pixels() -> None:
     assert pixels == other.renderer.patch_size**2 * other.reuse.store.capacity
     assert {**config.reuse.policy, "bootstrap_batches": 100} == other.reuse.policy
     assert config.resolution.start == config.renderer.patch_size == 64
+
+
+@pytest.mark.parametrize("budget", ["smoke", "small", "paper"])
+def test_the_denoiser_gets_8_samples_and_896_patches_whatever_the_budget(budget: str) -> None:
+    config = composed("method=anf", f"budget={budget}")
+    assert config.renderer.samples_per_pixel == 8
+    pixels = config.data.frames * config.renderer.patch_size**2 * config.reuse.store.capacity
+    assert pixels == 896 * composed().renderer.patch_size ** 2
 
 
 BUDGETS = ("smoke", "small", "paper")

@@ -40,7 +40,6 @@ SIGNS = {
     Verdict.NOT_REPRODUCED: "✗",
     Verdict.INCONCLUSIVE: "?",
     Verdict.NOT_RUN: "–",
-    Verdict.NOT_BUILT: "–",
 }
 """Stand before a verdict's words, so that it is told neither by colour nor by length alone."""
 
@@ -51,8 +50,6 @@ EXPLORATION_CAPTIONS = {
     "distance_": "distance between the chains' histogram and the target density over run time",
 }
 """By how the files' names begin; the scene's name follows."""
-
-WITHOUT_EVIDENCE = (Verdict.NOT_RUN, Verdict.NOT_BUILT)
 
 
 @dataclass(frozen=True)
@@ -100,7 +97,7 @@ def _context(
     contents: PageContents, progress: Callable[[Iterable[Any]], Iterable[Any]]
 ) -> dict[str, Any]:
     runs, summaries, styles = contents.runs, contents.summaries, contents.styles
-    tested = [result for result in contents.claims if result.verdict not in WITHOUT_EVIDENCE]
+    tested = [result for result in contents.claims if result.verdict is not Verdict.NOT_RUN]
     return {
         "contents": contents,
         "scene_sections": [
@@ -110,7 +107,7 @@ def _context(
         "claim_sections": [
             claim_section(result, runs, summaries, styles) for result in progress(tested)
         ],
-        "claims_without_runs": [r for r in contents.claims if r.verdict in WITHOUT_EVIDENCE],
+        "claims_without_runs": [r for r in contents.claims if r.verdict is Verdict.NOT_RUN],
         "verdict_counts": Counter(result.verdict for result in tested),
         "scenes": _distinct(run.scene for run in runs),
         "methods": _distinct(run.method for run in runs),

@@ -17,6 +17,9 @@ from analysis.runs import comparison_warnings, find_runs
 from ngi.train import train
 from tests.learn.command_line import SMALL
 from tests.learn.composition import run_config
+from tests.learn.lightning_warnings import IGNORED
+
+pytestmark = IGNORED
 
 REFERENCE_SAMPLES = 32
 
