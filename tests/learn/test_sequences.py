@@ -150,13 +150,16 @@ def test_wrong_numbers_are_named(changes: dict[str, float], message: str) -> Non
 
 
 def test_a_run_of_anf_takes_most_of_the_noise_from_its_scene(tmp_path: Path) -> None:
-    """It ends nearer to the references, whose noise is less, than the frames that it is given."""
     options = (
-        *("method=anf", "budget=steps", "budget.steps=130", "evaluation=smoke"),
+        *("method=anf", "budget=steps", "budget.steps=180", "evaluation=smoke"),
         *("evaluation.count=1", "renderer.patch_size=32", "resolution.start=32"),
         *("+renderer.noise=2.0", "model.hidden_features=16", "model.hidden_layers=4"),
         *("+model.dilations=[1,2,4]", "data.frames=2", "data.target_renderings=8"),
         *("reuse.store.capacity=12", "optimizer.lr=5e-3"),
+        *(
+            f"evaluation.evaluator.protocol.{n}"
+            for n in ("samples_per_pass=1024", "maximum_samples=4096")
+        ),
         *(f"run.folder={tmp_path / 'run'}", f"run.references={tmp_path / 'references'}"),
     )
     result = train(run_config(*options))
