@@ -1,3 +1,4 @@
+import json
 import math
 
 import pandas as pd
@@ -101,6 +102,17 @@ def test_the_best_mean_of_a_scene_is_marked(summaries) -> None:
     assert marks == {"uniform": 0, "mcmc_loss_step": 8, "reference": 0}
     assert to_markdown(worst_table(summaries)).count("**") == 2 + 2 * 8
     assert "*" not in to_terminal(cost_table(summaries))
+
+
+def test_costs_tell_what_a_frame_takes_where_runs_know_it(make_run, tmp_path) -> None:
+    make_run()
+    new = make_run(sampler="mcmc_loss_step") / "result.json"
+    seconds = {"buffers": 0.5, "inputs": 0.25, "network": 0.012}
+    new.write_text(json.dumps({**json.loads(new.read_text()), "frame_seconds": seconds}))
+    table = cost_table(summarise(name_methods(find_runs(tmp_path)[0])))
+    assert table.columns[-2:] == ("ms per frame: inputs", "network")
+    found = {row[1].text: [cell.text for cell in row[-2:]] for row in table.rows}
+    assert found == {"uniform sampling": ["–", "–"], "mcmc_loss_step": ["250", "12"]}
 
 
 @pytest.mark.parametrize("first", [True, False])

@@ -244,3 +244,33 @@ def test_references_above_the_noise_level_are_reported_once(
         evaluator.prepare()
     lines = [r for r in caplog.records if "references stayed above" in r.getMessage()]
     assert len(lines) == int(said)
+
+
+def test_what_a_frame_takes_is_told_by_part_and_rendered_once(
+    renderer, protocol, tmp_path, monkeypatch
+) -> None:
+    now, asked = [0.0], []
+    monkeypatch.setattr("ngi.evaluate.evaluator.perf_counter", lambda: now[0])
+
+    def observations(v: torch.Tensor, *, resolution: int) -> tuple[torch.Tensor, ...]:
+        asked.append((v, resolution))
+        now[0] += 2.0
+        return v, torch.zeros(3)
+
+    def predict(buffers: torch.Tensor, v: torch.Tensor, zeros: torch.Tensor) -> torch.Tensor:
+        assert zeros.shape == (3,)
+        now[0] += 0.5
+        return perfect(buffers, v)
+
+    evaluator = Evaluator(
+        renderer=renderer,
+        test_inputs=observations,
+        protocol=protocol,
+        cache=ReferenceCache(tmp_path),
+        lpips=NoLpips(),
+    )
+    for _ in range(2):
+        seconds = evaluator.evaluate(predict).result()["frame_seconds"]
+        assert seconds == {"buffers": 0.0, "inputs": 2.0, "network": 0.5}
+    assert len(asked) == 10 + protocol.low_discrepancy_frames
+    assert {resolution for _, resolution in asked} == {protocol.resolution}

@@ -57,7 +57,7 @@ def training() -> list[dict[str, float]]:
     """What the network gives of views it has not seen of the one scene it trains on, at times."""
     samples = ObservationSets(renderer=MovingCamera(patch_size=SIZE), observations=3)
     network = seeded(CNSR, seed=0)(
-        layout=samples.layout, scene_dimensions=4, hidden_features=64, hidden_layers=4
+        layout=samples.layout, scene_dimensions=4, hidden_features=48, hidden_layers=3
     )
     optimizer, loss = (
         torch.optim.Adam(network.parameters(), lr=2e-3),
@@ -65,8 +65,8 @@ def training() -> list[dict[str, float]]:
     )
     test_inputs, truth = samples.example(rendered(samples, seed=10_000))
     found = []
-    for step in range(601):
-        if step in (0, 60, 600):
+    for step in range(401):
+        if step in (0, 40, 400):
             with torch.no_grad():
                 output = network(*test_inputs)
             found.append(
@@ -90,8 +90,8 @@ def test_it_learns_one_scene_configuration(training) -> None:
 
 def test_it_blurs_less_with_more_training(training) -> None:
     _, early, late = training
-    assert early["detail"] < late["detail"] < 1.1
-    assert late["lost"] < 0.6 * early["lost"]
+    assert 2 * early["detail"] < late["detail"] < 1.1
+    assert late["lost"] < 0.85 * early["lost"]
 
 
 STEPS = ("budget.steps=40", "run.checkpoint_steps=5")
