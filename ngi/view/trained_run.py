@@ -56,9 +56,14 @@ class TrainedRun:
         scene_path: of a scene in the authors' format; others are known by name.
 
         Raises FileNotFoundError where this is no run's folder or it has no checkpoint yet, and
-        ValueError for a damaged one and for a scene that is unknown or has changed since.
+        ValueError for a damaged one, for a scene that is unknown or has changed since, and for a
+        run without a network.
         """
         settings = read_settings(folder)
+        if "path_tracing" in settings:
+            raise ValueError(
+                f"{folder} has no network: path tracing took its place; ngi.video shows its frames"
+            )
         checkpoint = _newest(folder)
         description = describe_scene(settings, scene_path)
         renderer = make_renderer(folder, settings, description)

@@ -15,6 +15,7 @@ from analysis.methods import name_methods
 from analysis.report import write_report
 from analysis.runs import comparison_warnings, find_runs
 from ngi.train import train
+from ngi.view.trained_run import TrainedRun
 from tests.learn.command_line import SMALL
 from tests.learn.composition import run_config
 from tests.learn.lightning_warnings import IGNORED
@@ -106,6 +107,17 @@ def test_it_stands_in_the_report_beside_trained_networks(runs: Path, tmp_path: P
     assert not [warning for warning in comparison_warnings(found) if "the same time" in warning]
     (row,) = frame_table(found).rows
     assert [cell.text for cell in row[1:3]] == ["path tracing, 8 spp", "8"]
+
+
+def test_there_is_no_network_to_open(runs: Path) -> None:
+    with pytest.raises(ValueError, match="few has no network"):
+        TrainedRun.open(runs / "few")
+
+
+def test_the_model_clock_needs_no_costs_where_nothing_is_trained(tmp_path: Path) -> None:
+    options = ("budget.clock=model", f"budget.costs={tmp_path / 'costs.json'}")
+    found = run(tmp_path, "run", "method=path_tracing_8spp", *options)
+    assert (found["clock"], found["run_seconds"]) == ("model", 0)
 
 
 def test_as_many_samples_as_a_time_allows(tmp_path: Path) -> None:

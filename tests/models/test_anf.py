@@ -123,11 +123,26 @@ def test_temporal_weights_leave_out_what_is_not_known() -> None:
     assert weights[0, :, 0, 0].tolist() == [0, 0, 0, 0, 1, 1, 0, 1, 1]
 
 
-def test_a_still_camera_makes_every_frame_less_noisy() -> None:
-    """With equal features everywhere the output is a running mean."""
+def indifferent() -> AffinityDenoiser:
+    """It tells f = 0, a = b = ln 2 and c = λ = 1/2 of every pixel."""
     net = denoiser()
     for parameter in net.unet.parameters():
-        parameter.data.zero_()  # f = 0, a = b = ln 2, c = λ = 1/2
+        parameter.data.zero_()
+    return net
+
+
+def test_frames_before_count_in_radiance_and_in_output() -> None:
+    """Eq. 5 gives the mean of both frames; Eq. 8 has 8 + c neighbours of it, and 9 of before."""
+    buffers, noisy, sources = sequence(frames=2)
+    before, now = 1.0, 3.0
+    noisy[:, 0], noisy[:, 1] = torch.tensor([before, now]).log1p()
+    output = torch.expm1(indifferent()(buffers, noisy, sources))[0, 1, 5, 5]
+    expected = (8.5 * (before + now) / 2 + 9 * before) / 17.5
+    torch.testing.assert_close(output, torch.full((3,), expected))
+
+
+def test_a_still_camera_makes_every_frame_less_noisy() -> None:
+    net = indifferent()
     buffers, _, _ = sequence(frames=6)
     noisy = torch.log1p(1 + 0.5 * torch.randn(1, 6, 12, 10, 3).abs())
     _, _, sources = sequence(frames=6)
