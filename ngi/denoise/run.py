@@ -13,7 +13,7 @@ from omegaconf import DictConfig
 from ngi.benchmark.inference import show
 from ngi.build import plain
 from ngi.denoise.frame_time import Frame, FrameTimes, largest_fitting
-from ngi.denoise.path_tracing import PathTracing
+from ngi.denoise.path_tracing import PathTracing, Plan
 from ngi.learn.clock import PAUSES, PHASES
 from ngi.provenance import provenance
 
@@ -48,22 +48,19 @@ def run_path_tracing(
     """
     plan = instantiate(config.path_tracing)
     label = {**plain(config.label), **dict.fromkeys(UNUSED, "none"), "seed": config.seed}
-    tracing = PathTracing(
+    folder.begin()
+    tracker.start(folder=folder.path, settings=folder.settings, label=label)
+    timed = _timed(config, plan, renderer)
+    log.info("%s: %s", folder.path, timed)
+    tracing = PathTracing(  # whose frames do not depend on how many were timed
         renderer=renderer,
         denoiser=plan.denoiser,
-        samples_per_pixel=plan.samples_per_pixel or 1,
+        samples_per_pixel=timed["samples_per_pixel"],
         seed=config.seed,
     )
     evaluator = instantiate(config.evaluation.evaluator)(
         renderer=renderer, test_inputs=tracing.test_inputs
     )
-    folder.begin()
-    tracker.start(folder=folder.path, settings=folder.settings, label=label)
-    frames = _Frames(config, tracing=tracing, resolution=evaluator.protocol.resolution)
-    if plan.samples_per_pixel is None:
-        frames.fit(plan.milliseconds)
-    timed = frames.timed()
-    log.info("%s: %s", folder.path, timed)
     evaluation = evaluator.evaluate(tracing.predict)
     _write(evaluation, folder=folder, tracker=tracker)
     result = {
@@ -92,6 +89,21 @@ def _write(evaluation: Evaluation, *, folder: RunFolder, tracker: Tracker) -> No
     folder.metrics.flush()
     tracker.log(row)
     evaluation.write_pictures(folder.pictures)
+
+
+def _timed(config: DictConfig, plan: Plan, renderer: Renderer) -> dict[str, Any]:
+    """The result's 'frame'."""
+    tracing = PathTracing(
+        renderer=renderer,
+        denoiser=plan.denoiser,
+        samples_per_pixel=plan.samples_per_pixel or 1,
+        seed=config.seed,
+    )
+    resolution = config.evaluation.evaluator.protocol.resolution
+    frames = _Frames(config, tracing=tracing, resolution=resolution)
+    if plan.samples_per_pixel is None:
+        frames.fit(plan.milliseconds)
+    return frames.timed()
 
 
 class _Frames:
