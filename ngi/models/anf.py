@@ -108,10 +108,11 @@ class AffinityDenoiser(nn.Module):
                 f"model.hidden_features is {hidden_features}, model.hidden_layers {hidden_layers}, "
                 f"model.affinity_features {affinity_features}: expected at least 4, 2 and 1"
             )
-        if kernel_size < 3 or kernel_size % 2 == 0 or not dilations or min(dilations) < 1:
+        whole = all(isinstance(dilation, int) and dilation > 0 for dilation in dilations)
+        if kernel_size < 3 or kernel_size % 2 == 0 or not dilations or not whole:
             raise ValueError(
                 f"model.kernel_size is {kernel_size} and model.dilations {list(dilations)}: "
-                "expected an odd number from 3 up, and numbers from 1 up"
+                "expected an odd number from 3 up, and a list of whole numbers from 1 up"
             )
         self.layout = layout
         self.kernel_size = kernel_size

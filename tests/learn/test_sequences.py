@@ -1,7 +1,6 @@
 """Sequences of noisy frames, on closed formulas with a camera that v moves."""
 
-from math import pi, sqrt
-from pathlib import Path
+from math import sqrt
 
 import pytest
 import torch
@@ -11,12 +10,7 @@ from ngi.learn import Sequences
 from ngi.models.affinity import warped
 from ngi.patches import Patches
 from ngi.render import AnalyticRenderer
-from ngi.train import train
-from tests.learn.composition import run_config
-from tests.learn.lightning_warnings import IGNORED
 from tests.learn.moving_camera import MovingCamera
-
-pytestmark = IGNORED
 
 PATCH, RESOLUTION, FRAMES, RENDERINGS = 16, 32, 4, 3
 NOISE = 0.1
@@ -147,23 +141,3 @@ def test_wrong_numbers_are_named(changes: dict[str, float], message: str) -> Non
     arguments = {"frames": 2, "target_renderings": 1, "reach": 0.1, **changes}
     with pytest.raises(ValueError, match=message):
         Sequences(renderer=AnalyticRenderer(dimensions=3, patch_size=8), **arguments)
-
-
-def test_a_run_of_anf_takes_most_of_the_noise_from_its_scene(tmp_path: Path) -> None:
-    options = (
-        *("method=anf", "budget=steps", "budget.steps=180", "evaluation=smoke"),
-        *("evaluation.count=1", "renderer.patch_size=32", "resolution.start=32"),
-        *("+renderer.noise=2.0", "model.hidden_features=16", "model.hidden_layers=4"),
-        *("+model.dilations=[1,2,4]", "data.frames=2", "data.target_renderings=8"),
-        *("reuse.store.capacity=12", "optimizer.lr=5e-3"),
-        *(
-            f"evaluation.evaluator.protocol.{n}"
-            for n in ("samples_per_pass=1024", "maximum_samples=4096")
-        ),
-        *(f"run.folder={tmp_path / 'run'}", f"run.references={tmp_path / 'references'}"),
-    )
-    result = train(run_config(*options))
-    assert result["patches_traced"] == 12 * 2  # the store is full, and nothing more is rendered
-    noise = sqrt(2 / pi) * 2 / sqrt(8)  # mean |error| of what it is given
-    assert result["metrics"]["hard"]["mape"]["mean"] < 0.7 * noise
-    assert set(result["frame_seconds"]) == {"buffers", "inputs", "network"}
