@@ -15,9 +15,9 @@ REFERENCE_NOISE = "reference noise"
 """Name of the row that says what a perfect prediction would score."""
 
 COSTS = ("steps", "patches_traced", "paths_traced", "run_seconds")
-FRAME_COSTS = {"frame_inputs_ms": "inputs", "frame_network_ms": "network"}
-"""Key -> part of a frame's time: what has to be rendered for the network beside the buffers, as the
-observations of CNSR, and the network."""
+FRAME_COST = "frame_ms"
+"""Milliseconds of a test frame: what has to be rendered for the network beside the buffers, as the
+observations of CNSR, and the network; runs of earlier versions do not know it."""
 METRIC_KEYS = tuple(f"{name}_{metric}" for name in SETS for metric in METRICS)
 
 
@@ -63,10 +63,10 @@ def _values(runs: Sequence[Run]) -> dict[str, Estimate | None]:
                 values[f"{set_name}_{metric}{suffix}"] = estimate(numbers) if complete else None
     for cost in COSTS:
         values[cost] = estimate([float(run.result[cost]) for run in runs])
-    for key, part in FRAME_COSTS.items():
-        seconds = [run.result.get("frame_seconds", {}).get(part) for run in runs]
-        known = [1e3 * second for second in seconds if second is not None]
-        values[key] = estimate(known) if len(known) == len(runs) else None
+    frames = [run.result["frame_seconds"] for run in runs if "frame_seconds" in run.result]
+    seconds = [frame["inputs"] + frame["network"] for frame in frames]
+    known = len(frames) == len(runs)
+    values[FRAME_COST] = estimate([1e3 * second for second in seconds]) if known else None
     return values
 
 

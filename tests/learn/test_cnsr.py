@@ -11,6 +11,8 @@ from torch import Tensor
 from ngi.learn import ObservationSets, seeded
 from ngi.models import CNSR, L1Dssim
 from ngi.patches import Patches
+from ngi.view.export import ExportOptions, export
+from ngi.view.trained_run import TrainedRun
 from tests.learn.command_line import run
 from tests.learn.comparison import assert_same_run
 from tests.learn.composition import run_config
@@ -140,3 +142,19 @@ def test_what_does_not_fit_is_refused_before_anything_is_rendered(
         build(run_config(*RUN[1:], *overrides), tmp_path)
     for word in words:
         assert word in str(refused.value)
+
+
+def test_a_run_can_be_looked_at_and_not_exported(tmp_path: Path) -> None:
+    status, output = run(
+        tmp_path, "renderer._target_=ngi.render.AnalyticRenderer", "budget.steps=2", base=RUN
+    )
+    assert status == 0, output
+    opened = TrainedRun.open(tmp_path / "run")
+    v = torch.tensor([0.2, 0.4, 0.6])
+    inputs = ObservationSets(renderer=opened.renderer, observations=3).test_inputs(v, resolution=24)
+    buffers = opened.renderer.image_buffers(v, resolution=24)
+    expected = torch.expm1(opened.network.render(buffers, *inputs))
+    torch.testing.assert_close(opened.radiance(v, resolution=24), expected)
+    with pytest.raises(ValueError, match="its network is a CNSR"):
+        export(ExportOptions(run=str(tmp_path / "run"), out=str(tmp_path / "network.onnx")))
+    assert not (tmp_path / "network.onnx").exists()

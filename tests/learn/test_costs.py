@@ -33,6 +33,15 @@ def keys(*overrides: str, dimensions: int = 3) -> dict[str, str]:
     return {part.name: part.key for part in run_components(config, renderer=renderer)}
 
 
+def test_samples_of_several_images_are_rendered_and_trained_on_at_a_price_of_their_own() -> None:
+    image = ("renderer.patch_size=16", "resolution.start=16")
+    patches = keys("method=uniform", *image)
+    sets = keys("method=uniform", "data=observation_sets", *image)
+    fewer = keys("method=uniform", "data=observation_sets", "data.observations=2", *image)
+    for component in ("training", "exploring", "rendering"):
+        assert len({patches[component], sets[component], fewer[component]}) == 3
+
+
 def test_the_clock_counts_steps_times_costs() -> None:
     counters = Counters(iteration=10, generated_batches=4, scored_batches=3)
     costs = {
