@@ -120,6 +120,7 @@ def test_the_clock_stands_still_and_half_of_the_time_is_training(
     view = LiveView(
         page=recorded,  # type: ignore[arg-type]
         studio=recorded,  # type: ignore[arg-type]
+        samples=recorded,  # type: ignore[arg-type]
         stream=recorded,  # type: ignore[arg-type]
         folder=recorded,  # type: ignore[arg-type]
         clock=clock,
