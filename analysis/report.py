@@ -18,6 +18,7 @@ from analysis.claim_tables import claims_table
 from analysis.dimensions_plot import write_dimensions_figure
 from analysis.exploration import exploration_table
 from analysis.exploration_plots import write_exploration_figures
+from analysis.films import film_tables
 from analysis.frame_times import frame_table
 from analysis.latex import to_latex
 from analysis.methods import differing_fields, methods_in_order, name_methods, title
@@ -67,6 +68,9 @@ def write_report(folder: Path, output: Path) -> Report:
         tables.append(frames)
     if (found := claims_table(claims)).rows:
         tables.insert(0, found)
+    films, unreadable = film_tables(folder, runs)
+    tables += films
+    warnings += unreadable
     output.mkdir(parents=True, exist_ok=True)
     files = _write_tables(tables, runs, summaries, doubts, output)
     missing = []
@@ -90,10 +94,11 @@ def write_report(folder: Path, output: Path) -> Report:
         warnings=warnings,
         exploration_table=exploration_table(runs),
         exploration_files=exploration,
+        films=films,
     )
     page = output / "index.html"
     write_page(contents, page, lambda parts: _progress(parts, "page"))
-    text = _text(runs, summaries, comparisons, [found, frames])
+    text = _text(runs, summaries, comparisons, [found, frames], films)
     return Report(text, [page, *files, *exploration], warnings)
 
 
@@ -125,6 +130,7 @@ def _text(
     summaries: Sequence[Summary],
     comparisons: Sequence[Comparison],
     others: Sequence[Table],
+    films: Sequence[Table],
 ) -> str:
     """The same tables for the terminal, a set of frames at a time so that they fit its width."""
     tables = [table for table in others if table.rows]
@@ -132,7 +138,7 @@ def _text(
         tables += [error_table(summaries, [name]), worst_table(summaries, [name])]
         if comparisons:
             tables.append(comparison_table(comparisons, [name]))
-    tables.append(cost_table(summaries))
+    tables += [cost_table(summaries), *films]
     return "\n\n".join([*map(to_terminal, tables), "\n".join(_notes(runs))])
 
 

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Sequence
 from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass
+from os.path import relpath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,11 +29,11 @@ class VideoOptions:
 
     Beside the MP4 file, a JSON file of the same name says what was measured: along a path that
     moves, the error of the changes from frame to frame (with a reference); where v stands still,
-    flicker.
+    flicker. `python -m analysis.report` tabulates every video*.json below its folder.
     """
 
     run: str = option("a run's folder, finished or not; of path tracing, finished")
-    out: str = option("file to write", "video.mp4")
+    out: str | None = option("file to write; null: video_PATH.mp4 in the run's folder", None)
     path: str = option(
         "through v: camera (the scene's own), hard_frames, static, or a JSON file with a list of v",
         "camera",
@@ -56,7 +57,7 @@ def write_video(options: VideoOptions) -> None:
 
     pyav()
     _check(options)
-    out = Path(options.out)
+    out = _out(options)
     with ExitStack() as stack:
         film = _film(options, stack)
         with mp4_file(out, frames_per_second=options.frames_per_second) as add_frame:
@@ -67,11 +68,17 @@ def write_video(options: VideoOptions) -> None:
     print(_table(film, measured))
 
 
+def _out(options: VideoOptions) -> Path:
+    if options.out is not None:
+        return Path(options.out)
+    return Path(options.run) / f"video_{Path(options.path).stem}.mp4"
+
+
 def _check(options: VideoOptions) -> None:
-    out = Path(options.out)
+    out = _out(options)
     if out.suffix != ".mp4":
         raise ValueError(f"out: '{out}' does not end with .mp4")
-    if not out.parent.is_dir():
+    if options.out is not None and not out.parent.is_dir():
         raise ValueError(f"out: there is no folder {out.parent}")
     if not options.resolution >= 1 or not options.frames_per_second >= 1:
         raise ValueError("resolution and frames_per_second have to be at least 1")
@@ -145,7 +152,7 @@ def _write_json(file: Path, options: VideoOptions, film: Film, measured: Measure
         "scene": first.scene_name,
         "scene_hash": first.renderer.scene_hash,
         "runs": [
-            {"folder": str(run.folder), "label": label, "step": run.step}
+            {"folder": relpath(run.folder, file.parent), "label": label, "step": run.step}
             for run, label in zip(film.runs, film.labels, strict=True)
         ],
         "protocol": asdict(first.protocol),

@@ -109,7 +109,7 @@ def _errors(table: pd.DataFrame, error: str) -> Figure:
             _error_panel(axes, shown[shown["volume"] == volume], reuse, error)
             axes.set_title(f"volume {volume:g}, {REUSE[reuse]}", fontsize=8, loc="left")
         panel_row[0].set_ylabel(ERRORS[error])
-    figure.supxlabel("run time in training steps, mean over seeds", fontsize=9)
+    panels[-1, len(volumes) // 2].set_xlabel("run time in training steps, mean over seeds")
     add_legend(figure)
     return figure
 

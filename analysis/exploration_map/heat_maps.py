@@ -25,7 +25,10 @@ REUSE = {False: "every batch new", True: "self-tuning reuse"}
 LARGEST = 4.0
 """Ratio at which the colours end."""
 
-LEGEND = "above 1 exploration wins; (in brackets): the 95 % interval holds 1; ≥, ≤: only a bound"
+LEGEND = (
+    "above 1 exploration wins; (in brackets): the 95 % interval holds 1; ≥, ≤: only a bound; "
+    "blank: not run"
+)
 
 
 def write_heat_maps(speedups: pd.DataFrame, folder: Path) -> list[Path]:
@@ -60,7 +63,7 @@ def _figure(speedups: pd.DataFrame, columns: str, rows: str) -> Figure:
         for axes, (sampler, name) in zip(panel_row, SAMPLERS.items(), strict=True):
             of_method = speedups[(speedups["sampler"] == sampler) & (speedups["reuse"] == reuse)]
             image = _panel(axes, of_method, columns, rows)
-            axes.set_title(name if reuse is False else "", fontsize=9)
+            axes.set_title(name.replace(", ", ",\n") if reuse is False else "", fontsize=7)
         panel_row[0].set_ylabel(f"{reuse_name}\n{KNOBS[rows]}")
     figure.supxlabel(KNOBS[columns], fontsize=9)
     bar = figure.colorbar(image, ax=panels, shrink=0.8, pad=0.01)

@@ -58,6 +58,7 @@ class PageContents:
 
     name: of the folder that is reported; claims: all of them, those without runs too;
     exploration: what the chains did, a table and its figures' files; no rows, none without chains
+    films: how steady networks are in motion; no tables without films
     """
 
     name: str
@@ -70,6 +71,7 @@ class PageContents:
     warnings: Sequence[str]
     exploration_table: Table
     exploration_files: Sequence[Path]
+    films: Sequence[Table]
 
 
 def write_page(

@@ -73,6 +73,12 @@ def error_picture(prediction: Tensor, reference: Tensor, epsilon: float) -> np.n
     return coloured
 
 
+def error_colours(length: int, thickness: int) -> np.ndarray:
+    """[thickness, length, 3] uint8: the colours of `error_picture` from 0 to `ERROR_RANGE`."""
+    levels = np.tile(np.linspace(0, 1, length), (thickness, 1))
+    return matplotlib.colormaps[COLOUR_MAP](levels, bytes=True)[..., :3]
+
+
 def srgb_picture(radiance: Tensor, exposure: float) -> Image.Image:
     """Linear radiance [H, W, 3] as a picture; non-finite pixels in cyan."""
     return Image.fromarray(eight_bit(tone_map(radiance, exposure)))
@@ -122,8 +128,7 @@ def _triptych(pictures: Sequence[Image.Image], labels: Sequence[str]) -> Image.I
 
 def _draw_colour_bar(sheet: Image.Image, *, left: int, top: int) -> None:
     height = sheet.height - top - _MARGIN
-    levels = np.repeat(np.linspace(1, 0, height)[:, None], _BAR_WIDTH, axis=1)
-    colours = matplotlib.colormaps[COLOUR_MAP](levels, bytes=True)[..., :3]
+    colours = np.rot90(error_colours(height, _BAR_WIDTH))  # 0 at the bottom
     sheet.paste(Image.fromarray(np.ascontiguousarray(colours)), (left, top))
     draw = ImageDraw.Draw(sheet)
     font = ImageFont.truetype(_font_file(), 12)

@@ -11,6 +11,7 @@ from typing import Any
 
 import viser
 
+from ngi.evaluate.pictures import ERROR_RANGE, error_colours
 from ngi.scene.kinds import Visibility
 from ngi.view.controls import Control
 from ngi.view.screen import PARTS, Screen
@@ -54,6 +55,11 @@ class Panel:
         self._on_change = on_change
         self._inputs: dict[int, Any] = {}
         self.status = gui.add_markdown("…")
+        self._error_scale = gui.add_image(
+            error_colours(256, 12),
+            label=f"|error| / (reference + {epsilon:g}), from 0 to {ERROR_RANGE:g} and above",
+            visible=False,
+        )
         self._add_presets()
         self._add_screen(buffers, resolution)
         self._add_controls()
@@ -119,6 +125,11 @@ class Panel:
             )
             self._curve = self._gui.add_dropdown("tone mapping", CURVES)
             self._exposure = self._gui.add_slider("exposure, stops", -8.0, 8.0, 0.25, 0.0)
+
+        @self._show.on_update
+        def _(_: object) -> None:
+            self._error_scale.visible = "error" in self.screen.parts
+
         for each in (self._show, self._resolution, self._curve, self._exposure):
             each.on_update(lambda _: self._on_change())
 

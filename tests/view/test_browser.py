@@ -25,6 +25,20 @@ if CHROMIUM is None:
 
 OPTIONS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader"]
 OPTIONS += ["--enable-unsafe-swiftshader"]
+WALKED = """
+name: room
+scene: scene.xml
+samples_per_pixel: 4
+max_depth: 4
+bounds: {minimum: [-1, 0, -1], maximum: [1, 2, 1]}
+variables:
+  - object: camera
+    property: look_at
+    minimum: [-1, 0.5, 3, 0, 1, 0]
+    maximum: [1, 1.5, 4, 0, 1, 0]
+  - {object: lamp, property: intensity, minimum: 0.5, maximum: 2}
+"""
+TINY = ("budget=smoke", "budget.steps=1", "evaluation.evaluator.protocol.low_discrepancy_frames=1")
 PATIENCE = 120_000
 """Milliseconds; WebGL by software is slow on a busy machine."""
 
@@ -162,6 +176,39 @@ def test_the_page_shows_what_is_computed_without_it(
         set_slider(page, 0, 2)
         brighter = wait_until_changed(page, before)
         assert brighter.mean() > before.mean()
+
+
+def test_the_mouse_walks_the_camera_within_its_box(
+    tmp_path: Path, browser: playwright.Browser
+) -> None:
+    scene = tmp_path / "scenes" / "room"
+    shutil.copytree(Path(__file__).parents[1] / "render" / "scenes" / "box", scene)
+    (scene / "scene.yaml").write_text(WALKED)
+    status, output = run(tmp_path, "run.folder=run", "scene=room", base=TINY)
+    assert status == 0, output
+    with viewer(tmp_path, free_port()) as address:
+        page = opened(browser, address)
+        before, start = picture(page), walked(page)
+        box = page.locator("canvas").first.bounding_box()
+        assert box is not None
+        page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+        page.mouse.down()
+        page.mouse.move(box["x"] + box["width"], box["y"] + box["height"] / 2, steps=5)
+        page.mouse.up()
+        wait_until_changed(page, before)
+        page.wait_for_timeout(2000)  # until nothing moves any more
+        end = walked(page)
+        assert end[:-1] != start[:-1]
+        assert end[-1] == start[-1]  # the lamp, which the mouse does not move
+        assert all(0 <= component <= 1 for component in end)
+        options = shlex.split(command(page))[3:-1]
+        np.testing.assert_array_equal(picture(page), rendered(tmp_path, options))
+
+
+def walked(page: playwright.Page) -> list[float]:
+    """v, as the page's command line has it."""
+    (v,) = [word for word in shlex.split(command(page)) if word.startswith("v=")]
+    return [float(number) for number in v[3:-1].split(",")]
 
 
 def test_two_browsers_and_a_configuration_that_is_saved_and_loaded(

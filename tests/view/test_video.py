@@ -45,7 +45,8 @@ def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def video(folder: Path, monkeypatch: pytest.MonkeyPatch, *options: str) -> int:
     monkeypatch.chdir(folder)
-    return main(["run=run", f"resolution={SIZE}", "frames_per_second=1", *options])
+    fixed = ("run=run", "out=video.mp4", f"resolution={SIZE}", "frames_per_second=1")
+    return main([*fixed, *options])
 
 
 def decoded(file: Path) -> list[NDArray[np.uint8]]:
@@ -77,9 +78,9 @@ def test_frames_are_the_pictures_of_the_render_command(trained: Path) -> None:
         timeout=300,
     )
     assert done.returncode == 0, done.stderr
-    assert "video.mp4: 10 frames; step 12" in done.stdout
+    assert "run/video_hard_frames.mp4: 10 frames; step 12" in done.stdout
     assert "needs a reference" in done.stdout
-    frames = decoded(trained / "video.mp4")
+    frames = decoded(trained / "run" / "video_hard_frames.mp4")
     assert len(frames) == 10
     pictures = [
         np.asarray(Image.open(trained / "run" / "pictures" / f"hard_{i:02}_prediction.png"))
@@ -89,8 +90,10 @@ def test_frames_are_the_pictures_of_the_render_command(trained: Path) -> None:
         shown = panel(frame, 0)
         assert psnr(shown, pictures[index]) > 35
         assert psnr(shown, pictures[(index + 1) % 10]) < 30
-    assert json.loads((trained / "video.json").read_text())["measured"] == {}
-    assert not list(trained.glob("*.partial"))
+    film = json.loads((trained / "run" / "video_hard_frames.json").read_text())
+    assert film["measured"] == {}
+    assert film["runs"] == [{"folder": ".", "label": "network", "step": 12}]
+    assert not list(trained.rglob("*.partial"))
 
 
 def test_the_file_is_what_browsers_play(trained: Path, monkeypatch: pytest.MonkeyPatch) -> None:
