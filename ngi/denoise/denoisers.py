@@ -21,7 +21,7 @@ class OpenImageDenoise:
     """Intel's Open Image Denoise, its filter 'RT' for high dynamic range, at its best quality.
 
     It is told that albedo and normal have no noise, which ours have not (`Renderer.image_buffers`).
-    On 8 samples per pixel that took 4 to 19 % off the error, at about twice the time.
+    On 8 samples per pixel that took 8 to 12 % off the error, at two to five times the time.
 
     Raises RuntimeError where the package is not installed.
     """
