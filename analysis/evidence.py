@@ -21,7 +21,6 @@ class Verdict(StrEnum):
     NOT_REPRODUCED = "not reproduced"
     INCONCLUSIVE = "inconclusive"
     NOT_RUN = "not run"
-    NOT_BUILT = "not built"
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,13 @@ TITLES = {
     "fixed_data": "a fixed data set",
     "prioritised_replay": "prioritised replay",
     "cnsr": "CNSR",
+    "anf": "path tracing + ANF, 8 spp",
+    "path_tracing": "path tracing, same time per frame",
+    "path_tracing_oidn": "path tracing + Open Image Denoise, same time per frame",
+    "path_tracing_optix": "path tracing + OptiX denoiser, same time per frame",
+    "path_tracing_8spp": "path tracing, 8 spp",
+    "path_tracing_oidn_8spp": "path tracing + Open Image Denoise, 8 spp",
+    "path_tracing_optix_8spp": "path tracing + OptiX denoiser, 8 spp",
 }
 """What tables and pictures call the options of the configuration group `method`, in order."""
 

@@ -178,7 +178,14 @@ def _draw(axes: Axes, panel: ErrorPanel, styles: Mapping[str, dict[str, Any]]) -
 
 
 def draw_band(axes: Axes, curve: Curve, *, label: str, color: str, linestyle: Any = "-") -> None:
-    """A curve's mean as a line with markers, and its interval as a band."""
+    """A curve's mean as a line with markers, and its interval as a band.
+
+    What takes no run time, because nothing is trained, is level all along.
+    """
+    if not curve.seconds.any():
+        axes.axhline(curve.mean[0], linewidth=LINE_WIDTH, label=label, color=color, ls=linestyle)
+        axes.axhspan(curve.low[0], curve.high[0], color=color, alpha=0.18, linewidth=0)
+        return
     axes.plot(
         curve.seconds,
         curve.mean,

@@ -19,6 +19,7 @@ from analysis.dimensions_plot import write_dimensions_figure
 from analysis.exploration import exploration_table
 from analysis.exploration_plots import write_exploration_figures
 from analysis.films import film_tables
+from analysis.frame_times import frame_table
 from analysis.latex import to_latex
 from analysis.methods import differing_fields, methods_in_order, name_methods, title
 from analysis.page import PageContents, write_page
@@ -63,6 +64,8 @@ def write_report(folder: Path, output: Path) -> Report:
     tables = [error_table(summaries), worst_table(summaries), cost_table(summaries)]
     if comparisons:
         tables.append(comparison_table(comparisons))
+    if (frames := frame_table(runs)).rows:
+        tables.append(frames)
     if (found := claims_table(claims)).rows:
         tables.insert(0, found)
     films, unreadable = film_tables(folder, runs)
@@ -95,7 +98,7 @@ def write_report(folder: Path, output: Path) -> Report:
     )
     page = output / "index.html"
     write_page(contents, page, lambda parts: _progress(parts, "page"))
-    text = _text(runs, summaries, comparisons, found, films)
+    text = _text(runs, summaries, comparisons, [found, frames], films)
     return Report(text, [page, *files, *exploration], warnings)
 
 
@@ -126,11 +129,11 @@ def _text(
     runs: Sequence[Run],
     summaries: Sequence[Summary],
     comparisons: Sequence[Comparison],
-    claims: Table,
+    others: Sequence[Table],
     films: Sequence[Table],
 ) -> str:
     """The same tables for the terminal, a set of frames at a time so that they fit its width."""
-    tables = [claims] if claims.rows else []
+    tables = [table for table in others if table.rows]
     for name in SETS:
         tables += [error_table(summaries, [name]), worst_table(summaries, [name])]
         if comparisons:

@@ -156,12 +156,15 @@ def check_comparable(runs: Sequence[Run]) -> None:
 def comparison_warnings(runs: Sequence[Run]) -> list[str]:
     """What makes a comparison doubtful without forbidding it, a line each.
 
-    Runs of one scene whose run times are more than 5 % apart, runs of which some counted measured
-    costs instead of the wall clock's seconds, and runs of different machines.
+    Trained runs of one scene whose run times are more than 5 % apart, runs of which some counted
+    measured costs instead of the wall clock's seconds, and runs of different machines.
     """
     warnings = []
     for scene in sorted({run.scene for run in runs}):
-        times = {run.folder: run.result["run_seconds"] for run in runs if run.scene == scene}
+        trained = [run for run in runs if run.scene == scene and run.result["steps"]]
+        if not trained:
+            continue
+        times = {run.folder: run.result["run_seconds"] for run in trained}
         shortest, longest = min(times, key=times.__getitem__), max(times, key=times.__getitem__)
         if times[longest] > (1 + MOST_TIME_APART) * times[shortest]:
             warnings.append(

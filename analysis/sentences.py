@@ -30,8 +30,6 @@ def in_words(
     """
     if verdict is Verdict.NOT_RUN:
         return f"Not run yet; {claim.command} runs it."
-    if verdict is Verdict.NOT_BUILT:
-        return "Not built yet: there is no such method to compare with."
     sentences = [f"{verdict.capitalize()}."]
     for comparison, results in zip(claim.comparisons, comparisons, strict=True):
         if not comparison.decides:

@@ -73,10 +73,7 @@ def _judge(claim: Claim, runs: Sequence[Run]) -> ClaimResult:
     ]
     if claim.id in FINDINGS:
         deciding += [finding.verdict for finding in findings] or [Verdict.INCONCLUSIVE]
-    if comparisons or findings:
-        verdict = all_of(deciding)
-    else:
-        verdict = Verdict.NOT_RUN if claim.built else Verdict.NOT_BUILT
+    verdict = all_of(deciding) if comparisons or findings else Verdict.NOT_RUN
     sentence = in_words(claim, verdict, by_comparison, findings)
     return ClaimResult(claim, comparisons, findings, verdict, sentence)
 

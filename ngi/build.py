@@ -66,9 +66,14 @@ def build_module(
 
 
 def run_components(config: DictConfig, *, renderer: Renderer) -> list[Component]:
-    """What the steps of this run spend time on, see `ngi.learn.costs`."""
+    """What the steps of this run spend time on, see `ngi.learn.costs`.
+
+    Nothing, where path tracing takes the network's place.
+    """
     from ngi import learn
 
+    if "path_tracing" in config:
+        return []
     scored = instantiate(config.sampler).needs_current
     return learn.components(plain(config), renderer=renderer, scored=scored)
 

@@ -55,8 +55,9 @@ MESSAGES = (ValueError, OSError, RuntimeError, FloatingPointError, TypeError)
 def train(config: DictConfig) -> dict[str, Any]:
     """Runs, or resumes, the run that `config` describes and returns its result.
 
-    A finished run is not run again. Raises ValueError for a configuration, scene, folder or
-    checkpoint that does not fit, before any long work; `Interrupted` after SIGTERM or SIGINT.
+    Where it says `path_tracing`, that takes the network's place and nothing is trained. A finished
+    run is not run again. Raises ValueError for a configuration, scene, folder or checkpoint that
+    does not fit, before any long work; `Interrupted` after SIGTERM or SIGINT.
     """
     from ngi import learn  # PyTorch and Lightning take seconds that --help need not wait for
 
@@ -73,6 +74,10 @@ def train(config: DictConfig) -> dict[str, Any]:
             if folder.result is not None:
                 log.info("%s is finished already; delete the folder to run it again", folder.path)
                 return folder.result
+            if "path_tracing" in config:
+                from ngi.denoise.run import run_path_tracing
+
+                return run_path_tracing(config, renderer=renderer, folder=folder, tracker=tracker)
             return _train(config, budget, renderer, folder, tracker, interruption)
         finally:
             with ExitStack() as stack:  # closes each, whatever happens in the others

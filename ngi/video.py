@@ -15,6 +15,7 @@ from ngi.options import option, run_tool
 
 if TYPE_CHECKING:
     from ngi.view.film import Film, Measured
+    from ngi.view.path_traced_run import PathTracedRun
     from ngi.view.trained_run import TrainedRun
 
 
@@ -31,14 +32,14 @@ class VideoOptions:
     flicker. `python -m analysis.report` tabulates every video*.json below its folder.
     """
 
-    run: str = option("a run's folder, finished or not")
+    run: str = option("a run's folder, finished or not; of path tracing, finished")
     out: str | None = option("file to write; null: video_PATH.mp4 in the run's folder", None)
     path: str = option(
         "through v: camera (the scene's own), hard_frames, static, or a JSON file with a list of v",
         "camera",
     )
     hard_frame: int = option("of path=static: which one", 0)
-    beside: Any = option("another run's folder of the same scene, or [FOLDER,FOLDER]", None)
+    beside: Any = option("another run's folder of the scene, or [FOLDER,FOLDER]", None)
     reference: int = option("samples per pixel, an even number, of path-traced frames beside it", 0)
     seconds: float = option("how long", 8.0)
     frames_per_second: int = option("of the video", 24)
@@ -90,15 +91,15 @@ def _check(options: VideoOptions) -> None:
 def _film(options: VideoOptions, stack: ExitStack) -> Film:
     """stack: closes the renderers."""
     from ngi.view.film import Film
+    from ngi.view.path_traced_run import open_run
     from ngi.view.scene_vectors import along, key_frames
-    from ngi.view.trained_run import TrainedRun
 
     scene = None if options.scene is None else Path(options.scene)
-    runs: list[TrainedRun] = []
+    runs: list[TrainedRun | PathTracedRun] = []
     for folder in (Path(options.run), *_beside(options.beside)):
         if folder.resolve() in (run.folder.resolve() for run in runs):
             raise ValueError(f"beside: {folder} is there already")
-        run = TrainedRun.open(folder, scene_path=scene)
+        run = open_run(folder, scene_path=scene)
         stack.enter_context(closing(run.renderer))
         if run.renderer.scene_hash != (runs or [run])[0].renderer.scene_hash:
             raise ValueError(

@@ -60,11 +60,12 @@ def test_no_constructor_takes_a_configuration() -> None:
         "ngi/build.py",
         "ngi/config_values.py",
         "ngi/costs.py",
+        "ngi/denoise/run.py",
         "ngi/exploration_map/training.py",
         "ngi/noise.py",
         "ngi/options.py",
         "ngi/stability/training_run.py",
-        "ngi/view/trained_run.py",
+        "ngi/view/run_settings.py",
     }
 
 

@@ -78,7 +78,7 @@ def test_the_defaults_are_the_papers() -> None:
 
 
 PRECONDITIONED, PLAIN = "pixel_generator", "pixel_generator_no_preconditioning"
-COMPETITORS = ("cnsr",)
+COMPETITORS = ("cnsr", "anf")
 """Other methods, whose samples are of another size."""
 METHODS = {  # sampler, resolution, model, specular
     "active_exploration": ("mcmc_loss_step", "growing", PRECONDITIONED, "learned"),
@@ -94,13 +94,34 @@ METHODS = {  # sampler, resolution, model, specular
     "metropolis": ("mcmc_metropolis", "growing", PRECONDITIONED, "learned"),
     "no_preconditioning": ("mcmc_loss_step", "growing", PLAIN, "learned"),
     "cnsr": ("uniform", "constant", "cnsr", "learned"),
+    "anf": ("uniform", "constant", "anf", "learned"),
     "traced_specular": ("mcmc_loss_step", "growing", PRECONDITIONED, "traced"),
 }
 PRIORITISED = {"_target_": "ngi.reuse.Prioritised", "alpha": 0.6, "beta": 0.4, "epsilon": 1e-6}
 
 
+PATH_TRACING = {  # option, samples per pixel
+    f"path_tracing{name}{suffix}": (option, samples)
+    for name, option in (("", "plain"), ("_oidn", "oidn"), ("_optix", "optix"))
+    for suffix, samples in (("", None), ("_8spp", 8))
+}
+
+
 def test_every_method_is_listed_here() -> None:
-    assert set(METHODS) == {file.stem for file in (CONF / "method").glob("*.yaml")}
+    found = {file.stem for file in (CONF / "method").glob("*.yaml")}
+    assert found == METHODS.keys() | PATH_TRACING.keys()
+
+
+@pytest.mark.parametrize("method", PATH_TRACING)
+def test_path_tracing_takes_the_place_of_training_and_changes_nothing_else(method: str) -> None:
+    config = composed(f"method={method}", "budget=small")
+    chosen, other = config.hydra.runtime.choices, composed("budget=small")
+    assert (chosen.path_tracing, config.path_tracing.samples_per_pixel) == PATH_TRACING[method]
+    assert config.path_tracing.milliseconds is None
+    assert {key: config[key] for key in other if key not in ("hydra", "label")} == {
+        key: other[key] for key in other if key not in ("hydra", "label")
+    }
+    assert "path_tracing" not in other
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -116,10 +137,10 @@ def test_a_method_differs_where_its_name_says_and_nowhere_else(method: str) -> N
     if method == "prioritised_replay":
         with open_dict(other):
             other.reuse.store.rule = PRIORITISED
-    for part in ("scene", "loss", "optimizer", "budget", "evaluation", "trainer"):
+    parts = ("scene", "optimizer", "budget", "evaluation", "trainer")
+    own = () if method in COMPETITORS else ("data", "reuse", "loss")
+    for part in (*parts, *own):
         assert config[part] == other[part], part
-    if method not in COMPETITORS:
-        assert (config.data, config.reuse) == (other.data, other.reuse)
 
 
 def test_the_store_of_a_competitor_holds_as_many_pixels() -> None:
@@ -129,6 +150,14 @@ def test_the_store_of_a_competitor_holds_as_many_pixels() -> None:
     assert pixels == other.renderer.patch_size**2 * other.reuse.store.capacity
     assert {**config.reuse.policy, "bootstrap_batches": 100} == other.reuse.policy
     assert config.resolution.start == config.renderer.patch_size == 64
+
+
+@pytest.mark.parametrize("budget", ["smoke", "small", "paper"])
+def test_the_denoiser_gets_8_samples_and_896_patches_whatever_the_budget(budget: str) -> None:
+    config = composed("method=anf", f"budget={budget}")
+    assert config.renderer.samples_per_pixel == 8
+    pixels = config.data.frames * config.renderer.patch_size**2 * config.reuse.store.capacity
+    assert pixels == 896 * composed().renderer.patch_size ** 2
 
 
 BUDGETS = ("smoke", "small", "paper")

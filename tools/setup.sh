@@ -33,7 +33,7 @@ if ! command -v nvidia-smi >/dev/null 2>&1 && [ -z "${PIP_EXTRA_INDEX_URL:-}${PI
         "PIP_EXTRA_INDEX_URL=<PyTorch's CPU index> make avoids that"
 fi
 "$VENV/bin/python" -m pip install --quiet --disable-pip-version-check \
-    --constraint constraints.txt --editable '.[dev,joblib,slurm,viewer,video,export]' ||
+    --constraint constraints.txt --editable '.[dev,joblib,slurm,viewer,video,denoise,export]' ||
     fail "pip could not install the dependencies; its message stands above"
 
 # Dr.Jit's fast CPU backend needs libLLVM 17 or newer. Without it everything runs, only slower.

@@ -15,6 +15,7 @@ from markupsafe import Markup
 
 from analysis.dimensions_plot import dimensions_figure, salons_of_both
 from analysis.evidence import Verdict
+from analysis.frame_times import frame_table
 from analysis.page.images import Illustration, from_figure, from_files
 from analysis.page.sections import Styles, claim_section, scene_section
 from analysis.phases import phase_table
@@ -39,7 +40,6 @@ SIGNS = {
     Verdict.NOT_REPRODUCED: "✗",
     Verdict.INCONCLUSIVE: "?",
     Verdict.NOT_RUN: "–",
-    Verdict.NOT_BUILT: "–",
 }
 """Stand before a verdict's words, so that it is told neither by colour nor by length alone."""
 
@@ -50,8 +50,6 @@ EXPLORATION_CAPTIONS = {
     "distance_": "distance between the chains' histogram and the target density over run time",
 }
 """By how the files' names begin; the scene's name follows."""
-
-WITHOUT_EVIDENCE = (Verdict.NOT_RUN, Verdict.NOT_BUILT)
 
 
 @dataclass(frozen=True)
@@ -101,7 +99,7 @@ def _context(
     contents: PageContents, progress: Callable[[Iterable[Any]], Iterable[Any]]
 ) -> dict[str, Any]:
     runs, summaries, styles = contents.runs, contents.summaries, contents.styles
-    tested = [result for result in contents.claims if result.verdict not in WITHOUT_EVIDENCE]
+    tested = [result for result in contents.claims if result.verdict is not Verdict.NOT_RUN]
     return {
         "contents": contents,
         "scene_sections": [
@@ -111,7 +109,7 @@ def _context(
         "claim_sections": [
             claim_section(result, runs, summaries, styles) for result in progress(tested)
         ],
-        "claims_without_runs": [r for r in contents.claims if r.verdict in WITHOUT_EVIDENCE],
+        "claims_without_runs": [r for r in contents.claims if r.verdict is Verdict.NOT_RUN],
         "verdict_counts": Counter(result.verdict for result in tested),
         "scenes": _distinct(run.scene for run in runs),
         "methods": _distinct(run.method for run in runs),
@@ -122,7 +120,11 @@ def _context(
         "times": time_table(runs),
         "exploration_figures": _exploration_figures(contents.exploration_files),
         "dimensions_figures": _dimensions_figures(runs),
-        "costs": [cost_table(summaries), phase_table(runs)],
+        "costs": [
+            table
+            for table in (cost_table(summaries), frame_table(runs), phase_table(runs))
+            if table.rows
+        ],
         "provenance": [provenance_table(runs), machine_table(runs)],
     }
 

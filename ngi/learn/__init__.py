@@ -17,6 +17,7 @@ from ngi.learn.row_log import RowLog
 from ngi.learn.run_folder import RunFolder
 from ngi.learn.samples import Example, PatchSamples, Samples
 from ngi.learn.scorer import Scorer
+from ngi.learn.sequences import Sequences
 from ngi.learn.step_guard import LARGEST_NORM, StepGuard, gradient_norm
 from ngi.learn.stream import TrainingStream
 from ngi.learn.target_map import TargetMap
@@ -52,6 +53,7 @@ __all__ = [
     "SamplerFeedback",
     "Samples",
     "Scorer",
+    "Sequences",
     "StepGuard",
     "TargetMap",
     "Tracker",

@@ -111,6 +111,10 @@ class ClosedFormRenderer(ABC):
         """See `ngi.render.Renderer.cameras`."""
         return torch.zeros(len(scene_vectors), 6)
 
+    def projections(self, scene_vectors: Tensor) -> Tensor:
+        """See `ngi.render.Renderer.projections`: the image is the unit square."""
+        return torch.eye(4).repeat(len(scene_vectors), 1, 1)
+
     def close(self) -> None:  # noqa: B027
         """Nothing works elsewhere."""
 

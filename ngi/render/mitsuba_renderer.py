@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from functools import cached_property
 
 import numpy as np
 import torch
@@ -14,6 +15,7 @@ from ngi.render.fitting import FittingTracer
 from ngi.render.jit_tracer import JitTracer, free_memory
 from ngi.render.launches import SAMPLES_PER_PASS, bands, passes
 from ngi.render.needs import buffers_are_static
+from ngi.render.projection import Projection
 from ngi.render.protocol import Deferred, RenderedPatches
 from ngi.render.render_inputs import check_states, patch_window, require_positive
 from ngi.render.scalar_tracer import ScalarTracer
@@ -184,6 +186,15 @@ class MitsubaRenderer:
     def cameras(self, scene_vectors: Tensor) -> Tensor:
         """See `ngi.render.Renderer.cameras`."""
         return torch.from_numpy(self._scene.description.cameras(scene_vectors.numpy())).float()
+
+    def projections(self, scene_vectors: Tensor) -> Tensor:
+        """See `ngi.render.Renderer.projections`."""
+        return torch.from_numpy(self._projection.matrices(scene_vectors.numpy())).float()
+
+    @cached_property
+    def _projection(self) -> Projection:
+        mi.set_variant(self._variant)
+        return Projection(self._scene)
 
     def hard_frames(self) -> Tensor:
         """[10, D]: the scene's hard test frames (paper, Sec. 7.2.1)."""

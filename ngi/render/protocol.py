@@ -119,6 +119,15 @@ class Renderer(Protocol):
         """
         ...
 
+    def projections(self, scene_vectors: Tensor) -> Tensor:
+        """[n, 4, 4] float32, for v [n, D]: where in the image a point is.
+
+        (x, y, ., w) = matrix (position, 1), for positions normalised as in the buffers: x / w and
+        y / w from 0 to 1 across and down the image, w > 0 in front of the camera. Raises ValueError
+        where the renderer cannot tell.
+        """
+        ...
+
     def hard_frames(self) -> Tensor:
         """[10, D]: the scene's hard test frames (paper, Sec. 7.2.1)."""
         ...

@@ -113,6 +113,10 @@ class WorkerRenderer:
         """See `ngi.render.Renderer.cameras`."""
         return self._local.cameras(scene_vectors)
 
+    def projections(self, scene_vectors: Tensor) -> Tensor:
+        """See `ngi.render.Renderer.projections`."""
+        return self._local.projections(scene_vectors)
+
     def hard_frames(self) -> Tensor:
         """See `ngi.render.Renderer.hard_frames`."""
         return self._local.hard_frames()

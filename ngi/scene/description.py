@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ngi.scene.scene_files import SceneFile
+from ngi.scene.transforms import Matrix, look_at
 from ngi.scene.variable import Variable
 from ngi.scene.yaml_keys import Vector
 
@@ -83,6 +84,14 @@ class SceneDescription:
         low, high = np.array(self.bounds)
         length = np.linalg.norm(direction, axis=1, keepdims=True)
         return np.hstack([(origin - low) / (high - low), direction / length])
+
+    def camera_to_world(self, scene_vector: ArrayLike) -> Matrix | None:
+        """[4, 4]: the camera's placement at v [D]; None where no variable says what it looks at."""
+        if self._view is None:
+            return None
+        variable, part = self._view
+        view = variable.value(np.asarray(scene_vector, dtype=np.float64)[part])
+        return look_at(view[:3], view[3:], np.array(variable.up))  # type: ignore[attr-defined]
 
     @cached_property
     def _view(self) -> tuple[Variable, slice] | None:

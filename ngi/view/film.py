@@ -14,6 +14,7 @@ from tqdm import tqdm
 from ngi.evaluate.pictures import side_by_side, srgb_picture
 from ngi.evaluate.temporal import Flicker, TemporalError
 from ngi.view.mp4 import AddFrame
+from ngi.view.path_traced_run import PathTracedRun
 from ngi.view.trained_run import TrainedRun
 
 Measured = dict[str, dict[str, float]]
@@ -38,7 +39,7 @@ class Film:
     exposure: of the pictures, in stops
     """
 
-    runs: Sequence[TrainedRun]
+    runs: Sequence[TrainedRun | PathTracedRun]
     labels: Sequence[str]
     path: Tensor
     resolution: int

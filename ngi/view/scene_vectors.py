@@ -11,6 +11,7 @@ from scipy.interpolate import PchipInterpolator
 from torch import Tensor
 
 from ngi.render import Renderer
+from ngi.view.path_traced_run import PathTracedRun
 from ngi.view.trained_run import TrainedRun
 
 PATHS = ("camera", "hard_frames", "static")
@@ -36,7 +37,7 @@ def hard_frame(renderer: Renderer, index: int) -> Tensor:
     return frames[index]
 
 
-def key_frames(path: str, run: TrainedRun, *, still: int) -> Tensor:
+def key_frames(path: str, run: TrainedRun | PathTracedRun, *, still: int) -> Tensor:
     """[K, D]: the configurations that a path goes through.
 
     path: 'camera' for the scene's own path, which of closed formulas is that through the hard

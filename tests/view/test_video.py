@@ -36,6 +36,7 @@ def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("run", (noisy,)),
         ("method=other", (noisy, "seed=1")),
         ("plain", ()),
+        ("paths", (noisy, "method=path_tracing_8spp")),
     ):
         status, output = run(folder, f"run.folder='{name}'", *overrides)
         assert status == 0, output
@@ -168,6 +169,16 @@ def test_a_network_does_not_flicker_and_a_path_tracer_does(
     assert all(psnr(panel(frame, 0), panel(first, 0)) > 45 for frame in others)
 
 
+def test_path_tracing_flickers_with_the_noise_of_its_samples(
+    trained: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    options = ("beside=paths", "path=static", "hard_frame=3", "seconds=6")
+    assert video(trained, monkeypatch, *options) == 0
+    measured = json.loads((trained / "video.json").read_text())["measured"]
+    assert measured["run"]["relative"] == 0
+    assert measured["paths"]["relative"] == pytest.approx(1.128 * NOISE / 8**0.5, rel=0.1)
+
+
 def test_pixels_that_a_path_made_nan_come_from_the_other_half(
     trained: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -196,6 +207,8 @@ def test_pixels_that_a_path_made_nan_come_from_the_other_half(
         (("beside=elsewhere",), "elsewhere/settings.json: no such file"),
         (("beside=plain",), "beside: plain was trained on another scene"),
         (("beside=[method=other,run]",), "beside: run is there already"),
+        (("beside=started",), "result.json: no such file; the run is not finished yet"),
+        (("beside=hostile",), "path_tracing.denoiser._target_ is 'os.system'"),
         (("beside=3",), "beside: 3; expected a folder"),
         (("path=zigzag",), "path: 'zigzag' is neither camera, hard_frames, static nor a file"),
         (("path=short.txt",), "path: short.txt[1]: [0.5, 0.5]; expected 3 numbers from 0 to 1"),
@@ -230,6 +243,12 @@ def test_mistakes_are_named(
         ("broken", "[[0, 0, 0]"),
     ):
         (trained / f"{name}.txt").write_text(content)
+    settings = json.loads((trained / "paths" / "settings.json").read_text())
+    for name, denoiser in (("started", None), ("hostile", {"_target_": "os.system"})):
+        (trained / name).mkdir(exist_ok=True)
+        settings["path_tracing"]["denoiser"] = denoiser
+        (trained / name / "settings.json").write_text(json.dumps(settings))
+    (trained / "hostile" / "result.json").write_text("{}")
     assert video(trained, monkeypatch, f"out={tmp_path / 'wrong.mp4'}", *options) == 2
     assert message in capsys.readouterr().err
     assert not list(tmp_path.iterdir())

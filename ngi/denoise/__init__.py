@@ -1,0 +1,16 @@
+"""What needs no training: path tracing at few samples per pixel, and production denoisers of it."""
+
+from ngi.denoise.denoisers import Denoiser, OpenImageDenoise, OptixDenoise
+from ngi.denoise.frame_time import FrameTimes, largest_fitting
+from ngi.denoise.path_tracing import PathTracing, Plan, guides
+
+__all__ = [
+    "Denoiser",
+    "FrameTimes",
+    "OpenImageDenoise",
+    "OptixDenoise",
+    "PathTracing",
+    "Plan",
+    "guides",
+    "largest_fitting",
+]

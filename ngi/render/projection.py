@@ -1,0 +1,51 @@
+"""Where in the image a point of the scene is."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ngi.backend import mi
+from ngi.scene.variable_scene import VariableScene
+
+
+class Projection:
+    """The perspective camera of a scene, as matrices that take points to the film.
+
+    Raises ValueError where the camera is moved by a variable that does not say what it looks at.
+    """
+
+    def __init__(self, scene: VariableScene) -> None:
+        self._description = scene.description
+        sensor = scene.scene.sensors()[0]
+        parameters = mi.traverse(sensor)
+        self._authored = np.array(parameters["to_world"].matrix, dtype=np.float64).reshape(4, 4)
+        looks = scene.description.camera_part.stop > 0
+        if sensor.id() in scene.moving and not looks:
+            raise ValueError(
+                f"{scene.description.name}: the camera is moved by other variables than look_at "
+                "and camera_path, and where it is cannot be told without loading the scene"
+            )
+        half = np.tan(np.radians(float(np.ravel(parameters["x_fov"])[0])) / 2)
+        shift = [float(np.ravel(parameters[f"principal_point_offset_{a}"])[0]) for a in "xy"]
+        # A film coordinate is 1/2 + offset - x / (2 z tan(fov / 2)); local x is to the left, y up.
+        self._to_film = np.array(
+            [
+                [-0.5 / half, 0, 0.5 + shift[0], 0],
+                [0, -0.5 / half, 0.5 + shift[1], 0],
+                [0, 0, 1, 0],
+                [0, 0, 1, 0],
+            ]
+        )
+
+    def matrices(self, scene_vectors: NDArray[np.float32]) -> NDArray[np.float64]:
+        """[n, 4, 4] for v [n, D]; see `ngi.render.Renderer.projections`."""
+        low, high = map(np.array, self._description.bounds)
+        to_world = np.eye(4)
+        to_world[:3] = np.column_stack([np.diag(high - low), low])
+        found = []
+        for v in scene_vectors:
+            placed = self._description.camera_to_world(v)
+            camera = self._authored if placed is None else placed
+            found.append(self._to_film @ np.linalg.inv(camera) @ to_world)
+        return np.array(found).reshape(-1, 4, 4)

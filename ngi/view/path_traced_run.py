@@ -1,0 +1,87 @@
+"""A run without a network: path tracing, as it was measured, opened from its folder."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from torch import Tensor
+
+from ngi.denoise import Denoiser, OpenImageDenoise, OptixDenoise, PathTracing
+from ngi.evaluate import EvaluationProtocol
+from ngi.render import Renderer
+from ngi.scene import SceneDescription
+from ngi.view.run_settings import describe_scene, make_renderer, plain, read_settings
+from ngi.view.trained_run import TrainedRun
+
+DENOISERS = {f"ngi.denoise.{kind.__name__}": kind for kind in (OpenImageDenoise, OptixDenoise)}
+
+
+@dataclass(frozen=True)
+class PathTracedRun:
+    """Frames of a run of `ngi.denoise`, with the samples per pixel that it had.
+
+    step: of training, 0
+    description: of its scene; None for closed formulas
+    """
+
+    folder: Path
+    scene_name: str
+    protocol: EvaluationProtocol
+    description: SceneDescription | None
+    renderer: Renderer
+    path_tracing: PathTracing
+    step: int = 0
+
+    @classmethod
+    def open(cls, folder: Path, *, scene_path: Path | None = None) -> PathTracedRun:
+        """Loads a finished run; nothing of it is changed or executed.
+
+        scene_path: of a scene in the authors' format; others are known by name.
+
+        Raises FileNotFoundError where it is not finished, ValueError for a scene or denoiser that
+        is unknown, and RuntimeError where the denoiser does not work here.
+        """
+        settings = read_settings(folder)
+        if not (result := folder / "result.json").exists():
+            raise FileNotFoundError(f"{result}: no such file; the run is not finished yet")
+        denoiser = _denoiser(settings["path_tracing"]["denoiser"])
+        description = describe_scene(settings, scene_path)
+        renderer = make_renderer(folder, settings, description)
+        return cls(
+            folder=folder,
+            scene_name=settings["scene"]["name"],
+            protocol=EvaluationProtocol(**plain(settings["evaluation"]["evaluator"]["protocol"])),
+            description=description,
+            renderer=renderer,
+            path_tracing=PathTracing(
+                renderer=renderer,
+                denoiser=denoiser,
+                samples_per_pixel=json.loads(result.read_text())["frame"]["samples_per_pixel"],
+                seed=settings["seed"],
+            ),
+        )
+
+    def radiance(self, scene_vector: Tensor, *, resolution: int) -> Tensor:
+        """[H, W, 3] linear radiance of the next frame; its noise is new in every frame."""
+        return self.path_tracing.radiance(scene_vector, resolution=resolution)
+
+
+def open_run(folder: Path, *, scene_path: Path | None = None) -> TrainedRun | PathTracedRun:
+    """Whichever of the two the folder holds; raises what their `open` raises."""
+    kind = PathTracedRun if "path_tracing" in read_settings(folder) else TrainedRun
+    return kind.open(folder, scene_path=scene_path)
+
+
+def _denoiser(settings: dict[str, Any] | None) -> Denoiser | None:
+    if settings is None:
+        return None
+    target = settings["_target_"]
+    if target not in DENOISERS:
+        raise ValueError(
+            f"settings.json: path_tracing.denoiser._target_ is '{target}', which no option of the "
+            "group path_tracing names; only what comes with this program is opened"
+        )
+    return DENOISERS[target]()

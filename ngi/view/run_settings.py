@@ -1,0 +1,95 @@
+"""What a run's folder says of its parts, made again; nothing but what comes with this program."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from hydra.utils import get_object
+from omegaconf import DictConfig, OmegaConf
+
+from ngi.learn import PatchSamples, Samples
+from ngi.render import Renderer
+from ngi.render.workers import mitsuba_renderer
+from ngi.resources import root
+from ngi.scene import SceneDescription, read_scene, scenes
+from ngi.scene.release import read_release
+
+
+def read_settings(folder: Path) -> dict[str, Any]:
+    """The run's settings.json; FileNotFoundError where there is none, ValueError if damaged."""
+    path = folder / "settings.json"
+    if not path.exists():
+        raise FileNotFoundError(
+            f"{path}: no such file; name the folder of one run, outputs/…/seed=0 for example"
+        )
+    try:
+        settings: dict[str, Any] = json.loads(path.read_text())
+    except ValueError as error:
+        raise ValueError(f"{path} is damaged ({error})") from error
+    return settings
+
+
+def made_by(settings: dict[str, Any], group: str) -> Callable[..., Any]:
+    """What makes a part of the run: the `_target_` of one of the group's options in conf/.
+
+    A run's folder may be somebody else's, and a `_target_` can name any function there is.
+    """
+    target = settings[group]["_target_"]
+    options = [OmegaConf.load(file) for file in (root() / "conf" / group).glob("*.yaml")]
+    known = {option.get("_target_") for option in options if isinstance(option, DictConfig)}
+    if not isinstance(target, str) or target not in known:
+        raise ValueError(
+            f"settings.json: {group}._target_ is '{target}', which no option of the group {group} "
+            "names; only what comes with this program is opened"
+        )
+    return get_object(target)
+
+
+def make_samples(settings: dict[str, Any], renderer: Renderer) -> Samples:
+    """What was trained on; patches, where the run is older than the group `data`."""
+    if "data" not in settings:
+        return PatchSamples(renderer=renderer)
+    samples: Samples = made_by(settings, "data")(**plain(settings["data"]), renderer=renderer)
+    return samples
+
+
+def plain(arguments: dict[str, Any]) -> dict[str, Any]:
+    """Without Hydra's own keys."""
+    return {name: value for name, value in arguments.items() if not name.startswith("_")}
+
+
+def describe_scene(settings: dict[str, Any], path: Path | None) -> SceneDescription | None:
+    """What varies in the run's scene; None where it is made of closed formulas.
+
+    path: of a scene in the authors' format; others are known by name, or ValueError is raised.
+    """
+    name = settings["scene"]["name"]
+    if made_by(settings, "renderer") is not mitsuba_renderer:
+        return None
+    if path is not None:
+        return read_release(path)
+    if name not in (known := scenes()):
+        raise ValueError(
+            f"scene '{name}' is not known here: name the folder above it in NGI_SCENES, or one of "
+            "the authors' scenes by scene=FOLDER"
+        )
+    return read_scene(**known[name])
+
+
+def make_renderer(
+    folder: Path, settings: dict[str, Any], description: SceneDescription | None
+) -> Renderer:
+    """Of the scene as it was for the run, in this process, on whatever it has; else ValueError."""
+    options = plain(settings["renderer"])
+    if description is not None:
+        options |= {"backend": "auto", "scene": description, "workers": 0, "cluster": None}
+    renderer: Renderer = made_by(settings, "renderer")(**options)
+    if renderer.scene_hash != settings["scene"]["hash"]:
+        raise ValueError(
+            f"{folder} was trained on '{settings['scene']['name']}' as it was then; the scene has "
+            "changed since, and a network knows only what it was trained on"
+        )
+    return renderer

@@ -1,0 +1,80 @@
+"""Open Image Denoise on closed formulas; OptiX where there is a GPU."""
+
+import sys
+
+import pytest
+import torch
+
+from ngi.backend import cuda_problem
+from ngi.denoise import OpenImageDenoise, OptixDenoise, PathTracing
+from ngi.evaluate import mape
+from ngi.render import AnalyticRenderer
+
+V = torch.tensor([0.3, 0.6, 0.9])
+SIZE = 64
+
+
+@pytest.fixture
+def oidn() -> OpenImageDenoise:
+    pytest.importorskip("pyoidn", reason="the extra 'denoise' is missing")
+    return OpenImageDenoise()
+
+
+def closed_form(denoiser: object) -> tuple[PathTracing, torch.Tensor]:
+    renderer = AnalyticRenderer(dimensions=3, patch_size=16, noise=1.0)
+    tracing = PathTracing(
+        renderer=renderer,
+        denoiser=denoiser,  # type: ignore[arg-type]
+        samples_per_pixel=8,
+        seed=0,
+    )
+    return tracing, renderer.whole_image(V, SIZE)[1]
+
+
+def test_most_of_the_noise_goes_and_the_brightness_stays(oidn: OpenImageDenoise) -> None:
+    tracing, clean = closed_form(oidn)
+    noisy = tracing.trace(V, resolution=SIZE)
+    buffers = tracing.renderer.image_buffers(V, resolution=SIZE)
+    kept = noisy.clone()
+    denoised = tracing.denoise(noisy, buffers)
+    assert mape(denoised, clean, 0.01) < 0.25 * mape(noisy, clean, 0.01)
+    assert denoised.mean().item() == pytest.approx(clean.mean().item(), rel=0.02)
+    assert torch.equal(tracing.denoise(noisy, buffers), denoised)
+    assert torch.equal(noisy, kept)
+
+
+@pytest.mark.parametrize(("probability", "shown"), [(0.5, (0.9, 1.1)), (0.001, (0.0, 0.2))])
+def test_a_caustic_that_paths_rarely_find_is_not_shown(
+    oidn: OpenImageDenoise, probability: float, shown: tuple[float, float]
+) -> None:
+    """A disc of light that one path in two finds is kept; of one in a thousand little is left.
+
+    The mean over many images is the same: what is lost is in no single image.
+    """
+    tracing, clean = closed_form(oidn)
+    buffers = tracing.renderer.image_buffers(V, resolution=SIZE)
+    y, x = torch.meshgrid(*[torch.linspace(-1, 1, SIZE)] * 2, indexing="ij")
+    disc = (x**2 + y**2 < 0.1)[..., None]
+    paths = torch.full((*disc.shape[:2], 1), 8.0)
+    generator = torch.Generator().manual_seed(0)
+    found = torch.binomial(paths, torch.tensor(probability), generator=generator) / paths
+    denoised = tracing.denoise(clean + disc * found / probability, buffers)
+    added = (denoised - clean)[disc.squeeze(-1)].mean().item()
+    assert shown[0] <= added <= shown[1]
+
+
+def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pyoidn", None)
+    with pytest.raises(RuntimeError, match=r"pip install -e \.\[denoise\]"):
+        OpenImageDenoise()
+
+
+def test_optix_takes_most_of_the_noise() -> None:
+    if (problem := cuda_problem()) is not None:
+        with pytest.raises(RuntimeError, match="path_tracing=optix does not work here"):
+            OptixDenoise()
+        pytest.skip(problem)
+    tracing, clean = closed_form(OptixDenoise())
+    noisy = tracing.trace(V, resolution=SIZE)
+    denoised = tracing.denoise(noisy, tracing.renderer.image_buffers(V, resolution=SIZE))
+    assert mape(denoised, clean, 0.01) < 0.5 * mape(noisy, clean, 0.01)
