@@ -14,9 +14,16 @@ from ngi.models.affinity import spatial_weights, temporal_weights, warped, weigh
 from ngi.models.pixel_generator import RADIANCE_CHANNELS
 from ngi.patches import BufferLayout
 
+LARGEST_FEATURE = 8.0
+SHARPNESS = 4.0
+"""Bandwidths are in units of it: of the untrained network a and b are 4 ln 2."""
+
 
 class UNet(nn.Module):
     """Convolutions at ever coarser resolutions and back, with skip connections.
+
+    The last layer sees the input too: what it says of a pixel can be of this pixel alone, which
+    convolutions have to learn. At edges of the scene that is decisive in short trainings.
 
     widths: features at full resolution and at each coarser one, which has half of the pixels a side
     """
@@ -29,12 +36,13 @@ class UNet(nn.Module):
         self.up = nn.ModuleList(
             nn.Conv2d(a + b, a, 3, padding=1) for a, b in reversed(list(pairwise(widths)))
         )
-        self.last = nn.Conv2d(widths[0], outputs, 1)
+        self.last = nn.Conv2d(widths[0] + inputs, outputs, 1)
 
     def forward(self, x: Tensor) -> Tensor:
         """[n, inputs, H, W] to [n, outputs, H, W]; the image is extended where halves are odd."""
         height, width = x.shape[2:]
         step = 2 ** (len(self.down) - 1)
+        pixels = x
         x = F.pad(x, (0, -width % step, 0, -height % step), mode="replicate")
         skipped: list[Tensor] = []
         for level, convolution in enumerate(self.down):
@@ -44,7 +52,7 @@ class UNet(nn.Module):
         for convolution in self.up:
             x = F.interpolate(x, scale_factor=2.0)
             x = F.leaky_relu(convolution(torch.cat([skipped.pop(), x], dim=1)))
-        output: Tensor = self.last(x)[..., :height, :width]
+        output: Tensor = self.last(torch.cat([x[..., :height, :width], pixels], dim=1))
         return output
 
 
@@ -86,9 +94,11 @@ class AffinityDenoiser(nn.Module):
 
     It differs from their program in this: it sees pixels, means over their samples, not single
     samples; of those log1p radiance and the scene's buffers, without their split into diffuse and
-    specular radiance, their depth and their flags; the sizes are those of the budget; a penalty of
-    1e-5 on the bandwidths is left out; it is trained from nothing, where the paper that we compare
-    with starts from weights trained on other scenes.
+    specular radiance, their depth and their flags; the sizes are those of the budget; features lie
+    in [-8, 8], since those without bounds can grow within tens of steps until no two pixels are
+    alike, where the gradient is 0 and the output is the input; a penalty of 1e-5 on the bandwidths
+    is left out; it is trained from nothing, where the paper that we compare with starts from
+    weights trained on other scenes.
     """
 
     def __init__(
@@ -128,6 +138,24 @@ class AffinityDenoiser(nn.Module):
             outputs=len(dilations) * (affinity_features + 2) + 2,
             widths=widths,
         )
+        self._tell_pixels_apart()
+
+    @torch.no_grad()
+    def _tell_pixels_apart(self) -> None:
+        """Makes the untrained kernels those of a joint bilateral filter.
+
+        A filter whose features are the same everywhere is at rest: it averages all that its kernels
+        reach, and the gradient of exp(−a |f_p − f_q|²) is 0 where f_p = f_q. PyTorch's initial
+        weights make signals smaller layer by layer: across an edge a |f_p − f_q|² is 1e-5 then, and
+        tens of steps change nothing. He et al. 2015 keep the size of the signals.
+        """
+        for module in self.modules():
+            if isinstance(module, nn.Conv2d):
+                nn.init.kaiming_normal_(module.weight, a=0.01)  # the slope of leaky_relu
+                assert module.bias is not None
+                nn.init.zeros_(module.bias)
+        of_features = len(self.dilations) * self.affinity_features
+        self.unet.last.weight[of_features:] *= 0.1  # bandwidths and centres are alike at first
 
     def forward(self, buffers: Tensor, noisy: Tensor, sources: Tensor) -> Tensor:
         """log1p of linear RGB radiance of every frame, [n, frames, H, W, 3].
@@ -184,8 +212,9 @@ class AffinityDenoiser(nn.Module):
         """predicted: the U-Net's; earlier, known: the frame before, warped, and where it is."""
         K, size = len(self.dilations), self.kernel_size
         features, a, c, b, λ = predicted.split([K * self.affinity_features, K, K, 1, 1], dim=1)
+        features = LARGEST_FEATURE * torch.tanh(features / LARGEST_FEATURE)
         of_kernel = features.split(self.affinity_features, dim=1)
-        a, c, b = F.softplus(a), torch.sigmoid(c), F.softplus(b)
+        a, c, b = SHARPNESS * F.softplus(a), torch.sigmoid(c), SHARPNESS * F.softplus(b)
         if earlier is not None and known is not None:
             λ = torch.sigmoid(λ) * known
             embeddings = torch.lerp(embeddings, earlier.embeddings, λ)
