@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import logging
 from functools import cached_property
 
@@ -69,6 +70,7 @@ class MitsubaRenderer:
         if specular not in ("learned", "traced"):
             raise ValueError(f"renderer.specular '{specular}': choose 'learned' or 'traced'")
         self._variant = activate(backend)
+        gc.collect()  # scenes of finished jobs of a sweep, else every launch looks through them too
         self._scene = VariableScene(scene, arrange=needed_only)
         self._require_square_film()
         first_hit = first_hit_of(
