@@ -70,7 +70,8 @@ class MitsubaRenderer:
         if specular not in ("learned", "traced"):
             raise ValueError(f"renderer.specular '{specular}': choose 'learned' or 'traced'")
         self._variant = activate(backend)
-        gc.collect()  # scenes of finished jobs of a sweep, else every launch looks through them too
+        # Scenes of a sweep's finished jobs are left in cycles, and slow every launch down.
+        gc.collect()
         self._scene = VariableScene(scene, arrange=needed_only)
         self._require_square_film()
         first_hit = first_hit_of(

@@ -1,7 +1,5 @@
 """Many variables at once with LLVM: the same scenes, and kernels that are never compiled again."""
 
-import gc
-
 import pytest
 import torch
 
@@ -90,7 +88,6 @@ def test_nothing_is_compiled_and_nothing_is_stale(update, make_scene) -> None:
     scene = read_scene(scene_of(update, make_scene))
 
     def renderer():
-        gc.collect()  # scenes that are not collected slow Dr.Jit down
         return MitsubaRenderer(scene=scene, backend="llvm", patch_size=16, samples_per_pixel=4)
 
     warm = renderer()
