@@ -3,7 +3,7 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-SWEEPS := same_time preconditioning resolution target_function acceptance histogram dimensions specular chess cnsr anf denoising
+SWEEPS := same_time preconditioning resolution target_function acceptance histogram dimensions specular chess cnsr anf denoising sampling
 BUDGET ?= small
 OPTIONS ?=
 .PHONY: help setup demo test report lint smoke benchmark doctor clean

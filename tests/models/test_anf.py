@@ -12,7 +12,8 @@ from ngi.models.affinity import (
     warped,
     weighted_mean,
 )
-from ngi.models.anf import AffinityDenoiser, UNet
+from ngi.models.anf import AffinityDenoiser
+from ngi.models.unet import UNet
 from ngi.patches import BufferLayout
 
 LAYOUT = BufferLayout(("position", "albedo"))
