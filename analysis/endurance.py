@@ -15,6 +15,7 @@ from analysis.statistics import LEVEL
 
 QUANTITIES = {
     "resident_bytes": ("main memory", "MiB", 2**-20),
+    "allocated_bytes": ("main memory in use", "MiB", 2**-20),
     "open_files": ("open files", "", 1.0),
     "folder_bytes": ("folder", "MiB", 2**-20),
     "steps_per_second": ("steps per second", "", 1.0),
@@ -29,7 +30,7 @@ COLUMNS = ("quantity", "first quarter", "last quarter", "change per hour", "± (
 
 
 def endurance(folder: Path) -> pd.DataFrame:
-    """A row per quantity: its means over the first and the last quarter, and its trend.
+    """A row per quantity that is known: its means over first and last quarter, and its trend.
 
     folder: of a run whose metrics.csv has at least a dozen rows; steps per second are those between
         two rows, those per second of processor time, which other programs hardly change, include an
@@ -51,6 +52,8 @@ def endurance(folder: Path) -> pd.DataFrame:
     settled = history[hours > SETTLED * hours.iloc[-1]]
     rows = []
     for column, (name, unit, factor) in QUANTITIES.items():
+        if column not in settled or settled[column].isna().all():
+            continue
         known = settled[column].dropna().astype(float) * factor
         values = known.to_numpy()
         slope, half_width = _trend(hours[known.index].to_numpy(), values)

@@ -6,20 +6,21 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-from ngi.memory import resident_bytes
+from ngi.memory import allocated_bytes, resident_bytes
 
-COLUMNS = ("resident_bytes", "open_files", "folder_bytes", "cpu_seconds")
+COLUMNS = ("resident_bytes", "allocated_bytes", "open_files", "folder_bytes", "cpu_seconds")
 
 
 def usage(folder: Path) -> dict[str, float | None]:
-    """By `COLUMNS`: main memory and open files of this process, size of a folder, processor time.
+    """By `COLUMNS`: memory of this process, in use too, open files, folder size, processor time.
 
-    The first two are None where the system does not say (it does on Linux). Processor time is this
-    process's since it began, of all its threads.
+    The first three are None where the system does not say (Linux with glibc does). Processor time
+    is this process's since it began, of all its threads.
     """
     files = Path("/proc/self/fd")
     values = (
         resident_bytes(),
+        allocated_bytes(),
         len(list(files.iterdir())) if files.exists() else None,
         _folder_bytes(folder),
         time.process_time(),

@@ -17,6 +17,7 @@ def write(folder: Path, *, growth: float = 0.0, rows: int = 49) -> Path:
             "step": (HOURS * 3600 * 5).astype(int),
             "wall_seconds": HOURS * 3600,
             "resident_bytes": (100 + growth * HOURS + generator.normal(0, 0.5, 49)) * 2**20,
+            "allocated_bytes": None,
             "open_files": 20,
             "folder_bytes": (HOURS * 2**20).astype(int),
             "cpu_seconds": HOURS * 3600 * 0.5
@@ -45,6 +46,7 @@ def test_speed_files_and_disk(tmp_path: Path) -> None:
     assert per_processor_second["first quarter"] == pytest.approx(10, rel=1e-3)
     assert per_processor_second["change per hour"] == pytest.approx(0, abs=0.01)
     assert table.loc["folder, MiB", "change per hour"] == pytest.approx(1, rel=1e-3)
+    assert "main memory in use, MiB" not in table.index, "not known"
     assert table.loc["open files", ["first quarter", "change per hour"]].tolist() == [20, 0]
 
 

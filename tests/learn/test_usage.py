@@ -17,7 +17,19 @@ def test_memory_files_and_folder_grow_by_what_is_added(tmp_path: Path) -> None:
     for stream in streams:
         stream.close()
     assert 45 * 2**20 < grown["resident_bytes"] < 60 * 2**20
+    assert abs(grown["allocated_bytes"]) < 5 * 2**20
     assert grown["open_files"] == 3
     assert grown["folder_bytes"] == 1234
     assert 0 < grown["cpu_seconds"] < 10
     held.close()
+
+
+def test_memory_in_use_is_what_was_asked_for_and_not_yet_given_back(tmp_path: Path) -> None:
+    def mebibytes() -> float:
+        return (usage(tmp_path)["allocated_bytes"] or 0) / 2**20
+
+    before = mebibytes()
+    held = bytearray(100 * 2**20)
+    assert 95 < mebibytes() - before < 105
+    del held
+    assert abs(mebibytes() - before) < 5
