@@ -24,17 +24,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if unknown := sorted(set(chosen.groups) - set(GROUPS)):
         parser.error(f"no group {', '.join(unknown)}; there are {', '.join(GROUPS)}")
     keep_freed_memory()
-    rows = run({name: GROUPS[name] for name in chosen.groups or GROUPS}, matching=chosen.matching)
+    groups = {name: GROUPS[name] for name in chosen.groups or GROUPS}
+    rows = run(groups, matching=chosen.matching)
     if not rows:
-        parser.error(f"no case has '{chosen.matching}' in its name; --list shows them")
+        names = ", ".join(case.name for cases in groups.values() for case in cases)
+        parser.error(f"no case has '{chosen.matching}' in its name; there are {names}")
     table = pd.DataFrame([row.columns() for row in rows])
+    file = chosen.output / ("stability_part" if chosen.groups or chosen.matching else "stability")
     chosen.output.mkdir(parents=True, exist_ok=True)
-    write_atomically(chosen.output / "stability.csv", table.to_csv(index=False).encode())
+    write_atomically(file.with_suffix(".csv"), table.to_csv(index=False).encode())
     text = markdown(table)
-    write_atomically(chosen.output / "stability.md", text.encode())
+    write_atomically(file.with_suffix(".md"), text.encode())
     print(text)
     failed = sum(not row.outcome.passed for row in rows)
-    print(f"\n{len(rows)} cases, {failed} failed; {chosen.output}/stability.csv")
+    print(f"\n{len(rows)} cases, {failed} failed; {file.with_suffix('.csv')}")
     return 1 if failed else 0
 
 
@@ -83,7 +86,8 @@ def _parser(groups: Mapping[str, Sequence[Case]]) -> argparse.ArgumentParser:
         "--output",
         type=Path,
         default=Path("outputs/stability"),
-        help="folder for stability.csv and stability.md (default: %(default)s)",
+        help="folder for stability.csv and stability.md, of a part of the cases stability_part.* "
+        "(default: %(default)s)",
     )
     return parser
 
