@@ -1,8 +1,8 @@
 """How much of a difference is the steps that a method had no time for?
 
-`python -m analysis.examples.same_steps FOLDER [SCENE …]` compares every method with uniform
-sampling, after the same run time and after the same number of steps. Cells begin with `# %%`, see
-`questions.py`.
+`python -m analysis.examples.same_steps FOLDER [SCENE …]` compares every method that is trained
+with uniform sampling, after the same run time and after the same number of steps. Cells begin with
+`# %%`, see `questions.py`.
 """
 
 # %%
@@ -15,7 +15,7 @@ from analysis import load_runs
 from analysis.effects import paired_effect
 
 evaluations = load_runs(sys.argv[1] if len(sys.argv) > 1 else "outputs/demo").evaluations
-of_hard_frames = evaluations.query("statistic == 'mean' and set == 'hard'")
+of_hard_frames = evaluations.query("statistic == 'mean' and set == 'hard' and step > 0")
 scenes = sys.argv[2:] or sorted(of_hard_frames["scene"].unique())
 
 # %% Mean logarithm of the metrics: a column per method, scene and seed, a row per step

@@ -70,12 +70,7 @@ class _Stateless:
         return PolicyState()
 
     def update(
-        self,
-        state: PolicyState,
-        *,
-        reused: bool,
-        losses: Tensor,
-        large_step: Tensor,
+        self, state: PolicyState, *, reused: bool, losses: Tensor, large_step: Tensor
     ) -> PolicyState:
         """See `ReusePolicy`."""
         return replace(state, generated_batches=state.generated_batches + (not reused))
@@ -85,12 +80,7 @@ class Never(_Stateless):
     """Generates every batch: the paper's test of the samples' distribution (Sec. 5.1)."""
 
     def probability(
-        self,
-        state: PolicyState,
-        *,
-        generated_batches: int,
-        store_size: int,
-        store_capacity: int,
+        self, state: PolicyState, *, generated_batches: int, store_size: int, store_capacity: int
     ) -> float:
         """See `ReusePolicy`."""
         return 0.0
@@ -105,12 +95,7 @@ class UntilFull(_Stateless):
     """
 
     def probability(
-        self,
-        state: PolicyState,
-        *,
-        generated_batches: int,
-        store_size: int,
-        store_capacity: int,
+        self, state: PolicyState, *, generated_batches: int, store_size: int, store_capacity: int
     ) -> float:
         """See `ReusePolicy`."""
         return 1.0 if store_size >= store_capacity else 0.0
@@ -127,12 +112,7 @@ class FixedProbability(_Stateless):
         self._probability = probability
 
     def probability(
-        self,
-        state: PolicyState,
-        *,
-        generated_batches: int,
-        store_size: int,
-        store_capacity: int,
+        self, state: PolicyState, *, generated_batches: int, store_size: int, store_capacity: int
     ) -> float:
         """See `ReusePolicy`."""
         if store_size == 0 or generated_batches < self._bootstrap_batches:
@@ -171,12 +151,7 @@ class SelfTuning:
         return PolicyState()
 
     def probability(
-        self,
-        state: PolicyState,
-        *,
-        generated_batches: int,
-        store_size: int,
-        store_capacity: int,
+        self, state: PolicyState, *, generated_batches: int, store_size: int, store_capacity: int
     ) -> float:
         """See `ReusePolicy`."""
         if store_size == 0 or generated_batches < self._bootstrap_batches:
