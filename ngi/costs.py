@@ -21,9 +21,9 @@ from tabulate import tabulate
 
 from ngi.build import build_module, build_samples, build_stream, plain, run_components
 from ngi.config_values import check_values
+from ngi.configuration import register
 from ngi.memory import keep_freed_memory
 from ngi.resources import cache_folder, root
-from ngi.train import register
 
 if TYPE_CHECKING:
     from ngi.learn import Component, CostFile

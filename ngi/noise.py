@@ -21,9 +21,9 @@ from tabulate import tabulate
 
 from ngi.build import build_module, build_samples
 from ngi.config_values import check_values
+from ngi.configuration import register
 from ngi.costs import in_this_process, with_overrides
 from ngi.resources import root
-from ngi.train import register
 
 if TYPE_CHECKING:
     from torch import Tensor

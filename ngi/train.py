@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import os
 import sys
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -11,20 +10,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import hydra
-from hydra.core.config_store import ConfigStore
 from hydra.errors import CompactHydraException
 from hydra.utils import instantiate
-from omegaconf import DictConfig, OmegaConf
+from omegaconf import DictConfig
 
-import ngi
 from ngi.build import build_module, build_samples, build_stream, plain, run_costs
 from ngi.config_values import check_values
+from ngi.configuration import register, run_settings
 from ngi.energy import EnergyMeter, energy_counters
 from ngi.memory import keep_freed_memory
-from ngi.precision import fast_precision
-from ngi.resources import cache_folder, root
-from ngi.run_name import run_group, run_name
-from ngi.scene import scenes
+from ngi.resources import root
 
 if TYPE_CHECKING:
     from ngi import learn
@@ -32,21 +27,6 @@ if TYPE_CHECKING:
     from ngi.render import Renderer
 
 log = logging.getLogger(__name__)
-
-NOT_IDENTITY = (
-    "run",
-    "viewer",
-    "tracker",
-    "label",
-    "budget.costs",
-    "renderer.scene",
-    "renderer.workers",
-    "renderer.cluster",
-    "evaluation.evaluator.cache",
-    "evaluation.evaluator.lpips",
-)
-"""Parts of the configuration that do not decide what a run computes: names, places, helpers."""
-
 
 MESSAGES = (ValueError, OSError, RuntimeError, FloatingPointError, TypeError)
 """Exceptions whose text says to users what is wrong; all others are bugs."""
@@ -67,7 +47,7 @@ def train(config: DictConfig) -> dict[str, Any]:
         budget = instantiate(config.budget)
         renderer = instantiate(config.renderer)
         costs = run_costs(config, budget=budget, renderer=renderer)
-        settings = _settings(config, scene_hash=renderer.scene_hash, costs=costs)
+        settings = run_settings(config, scene_hash=renderer.scene_hash, costs=costs)
         folder = learn.RunFolder(Path(config.run.folder), settings=settings)
         tracker = instantiate(config.tracker)
         try:
@@ -212,42 +192,6 @@ def _live_view(
         protocol=instantiate(config.evaluation.evaluator.protocol),
         port=config.run.viewer_port,
     )
-
-
-def _settings(config: DictConfig, *, scene_hash: str, costs: learn.Costs | None) -> dict[str, Any]:
-    """What decides the result. Scene and costs count by content, not by where they lie."""
-    settings = plain(config)
-    for key in NOT_IDENTITY:
-        *path, last = key.split(".")
-        parent = settings
-        for part in path:
-            parent = parent[part]
-        parent.pop(last, None)
-    settings["scene"] = {"name": config.scene.name, "hash": scene_hash}
-    settings["costs"] = costs
-    settings["version"] = ngi.__version__
-    return settings
-
-
-def register() -> None:
-    """Makes scene folders options of the group `scene`, and the resolvers known to OmegaConf."""
-    os.environ["NGI_ROOT"] = str(root())
-    store = ConfigStore.instance()
-    for name, arguments in scenes().items():
-        reader = {"_target_": "ngi.scene.read_scene", **arguments}
-        store.store(group="scene", name=name, node={"name": name, "reader": reader})
-    OmegaConf.register_new_resolver("run_name", run_name, replace=True)
-    OmegaConf.register_new_resolver("run_group", run_group, replace=True)
-    OmegaConf.register_new_resolver("fast_precision", fast_precision, replace=True)
-    OmegaConf.register_new_resolver("folder_name", lambda path: Path(path).name, replace=True)
-    OmegaConf.register_new_resolver("cache_folder", lambda: str(cache_folder()), replace=True)
-
-
-def composed(*overrides: str) -> DictConfig:
-    """The configuration that these words of a command line give."""
-    register()
-    with hydra.initialize_config_dir(str(root() / "conf"), version_base="1.3"):
-        return hydra.compose("train", list(overrides))
 
 
 @hydra.main(version_base="1.3", config_path=str(root() / "conf"), config_name="train")

@@ -59,6 +59,7 @@ def test_no_constructor_takes_a_configuration() -> None:
         "ngi/train.py",
         "ngi/build.py",
         "ngi/config_values.py",
+        "ngi/configuration.py",
         "ngi/costs.py",
         "ngi/denoise/run.py",
         "ngi/exploration_map/training.py",

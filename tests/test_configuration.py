@@ -9,12 +9,12 @@ from hydra.core.hydra_config import HydraConfig
 from hydra.utils import instantiate
 from omegaconf import DictConfig, open_dict
 
+from ngi.configuration import register
 from ngi.explore import MarkovChains
 from ngi.models import PixelGenerator
 from ngi.patches import BufferLayout
 from ngi.render import AnalyticRenderer
 from ngi.resources import root, scene_folders
-from ngi.train import register
 
 CONF = root() / "conf"
 GROUPS = (

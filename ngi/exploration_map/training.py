@@ -14,11 +14,11 @@ from omegaconf import DictConfig, OmegaConf
 
 from ngi import learn
 from ngi.build import build_module, build_samples, build_stream, plain
+from ngi.configuration import composed
 from ngi.exploration_map.plan import Plan
 from ngi.exploration_map.setting import Method, Setting
 from ngi.exploration_map.test_set import TestSet
 from ngi.render import PocketRenderer
-from ngi.train import composed
 
 PARTS = ("sampler", "reuse", "resolution", "model", "loss", "optimizer", "renderer")
 """Of the program's configuration, that a run of the map is built from."""

@@ -17,12 +17,12 @@ from torch import Tensor
 
 from ngi import learn
 from ngi.build import build_module, build_samples, build_stream
+from ngi.configuration import composed
 from ngi.exploration_map.test_set import TestSet
 from ngi.learn.lightning_api import Callback, Trainer
 from ngi.learn.step_guard import REPORT
 from ngi.render import Deferred, PocketRenderer, RenderedPatches
 from ngi.stability.case import Conditions
-from ngi.train import composed
 
 SIZE = (
     "experiment=exploration_map",

@@ -15,13 +15,13 @@ import torch
 from omegaconf import open_dict
 
 from ngi.backend import llvm_problem
+from ngi.configuration import run_settings
 from ngi.render import watchdog
 from ngi.render.mitsuba_renderer import MitsubaRenderer
 from ngi.render.worker_process import WorkerProcess, visible_gpus
 from ngi.render.worker_protocol import Request
 from ngi.render.workers import WorkerRenderer, mitsuba_renderer
 from ngi.scene import read_scene, scenes
-from ngi.train import _settings
 from tests.render.odd_renderer import (
     OddRenderer,
     PlaceRenderer,
@@ -259,5 +259,5 @@ def test_workers_are_no_part_of_a_runs_identity() -> None:
         assert config.hydra.job.override_dirname == ""
         with open_dict(config):
             del config.hydra
-        settings.append(_settings(config, scene_hash="", costs=None))
+        settings.append(run_settings(config, scene_hash="", costs=None))
     assert settings[0] == settings[1]
