@@ -151,7 +151,8 @@ class Sequences:
         height, width = points.shape[2:4]
         matrices = self._renderer.projections(path[:, :-1].flatten(0, 1))
         matrices = matrices.view(*points.shape[:2], 1, 4, 4).to(points)
-        film = torch.einsum("nfpij,nfpj->nfpi", matrices, _homogeneous(points.flatten(2, 3)))
+        with torch.autocast(points.device.type, enabled=False):  # bfloat16 tells 256 pixels apart
+            film = torch.einsum("nfpij,nfpj->nfpi", matrices, _homogeneous(points.flatten(2, 3)))
         scale, corner = resolution.to(points)[:, None, None, None], corner.to(points)
         w = film[..., 3:]
         pixel = (scale * film[..., :2] / w - corner[:, None, None]).floor()

@@ -31,8 +31,8 @@ SHARE = 0.5
 """Most of the wall time that the page takes."""
 REFRESH = 5.0
 """Seconds between two pictures of the training, at least."""
-LAST = 1e12
-"""Place of a folder below all others; viser counts up as parts are added."""
+FIRST = -1.0
+"""Place of a folder above all others; viser counts up from 0 as parts are added."""
 HARDEST = 8
 KEPT_BATCHES = 60
 """Generated batches whose proposals are shown."""
@@ -162,7 +162,7 @@ class TrainingPanel:
 
     def __init__(self, gui: viser.GuiApi, components: Sequence[str]) -> None:
         self._axes = {name: Axis(name, index) for index, name in enumerate(components)}
-        with gui.add_folder("Training", order=LAST):
+        with gui.add_folder("Training", order=FIRST):
             self._across = gui.add_dropdown("chains, across", components)
             self._up = gui.add_dropdown("chains, up", components, initial_value=components[1])
             self._image = gui.add_image(np.full((8, 8, 3), 255, np.uint8), format="png")

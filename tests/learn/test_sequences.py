@@ -35,12 +35,14 @@ def sequences(noise: float = 0.0, reach: float = 0.5) -> Sequences:
     )
 
 
-def rendered(samples: Sequences, states: Tensor, seed: int = 0) -> Patches:
-    found = samples.start_patches(states, resolution=RESOLUTION, seed=seed).result()
+def rendered(
+    samples: Sequences, states: Tensor, seed: int = 0, resolution: int = RESOLUTION
+) -> Patches:
+    found = samples.start_patches(states, resolution=resolution, seed=seed).result()
     return Patches(
         scene_vector=states[:, :-2],
         position=states[:, -2:],
-        resolution=torch.full((len(states),), RESOLUTION),
+        resolution=torch.full((len(states),), resolution),
         large_step=torch.ones(len(states), dtype=torch.bool),
         buffers=found.buffers,
         log_radiance=found.log_radiance,
@@ -141,3 +143,13 @@ def test_wrong_numbers_are_named(changes: dict[str, float], message: str) -> Non
     arguments = {"frames": 2, "target_renderings": 1, "reach": 0.1, **changes}
     with pytest.raises(ValueError, match=message):
         Sequences(renderer=AnalyticRenderer(dimensions=3, patch_size=8), **arguments)
+
+
+def test_where_a_pixel_was_does_not_depend_on_the_precision_of_training() -> None:
+    samples = sequences()
+    patches = rendered(samples, states(), resolution=256)
+    (_, _, expected), _ = samples.example(patches)
+    with torch.autocast("cpu", torch.bfloat16):
+        (_, _, sources), _ = samples.example(patches)
+    assert (expected >= 0).any()
+    torch.testing.assert_close(sources, expected, rtol=0, atol=0)
