@@ -70,7 +70,7 @@ def measure(config: DictConfig) -> list[tuple[str, float, float, float]]:
                     proposals = Proposals(chunk, torch.ones(len(chunk), dtype=torch.bool))
                     ahead = ProposalsAhead(proposals, resolution=resolution, seed=factor)
                     ahead.start(samples)
-                    inputs, truth = samples.example(ahead.patches())
+                    inputs, truth = samples.example(ahead.patches().to("cpu"))
                     with torch.no_grad():
                         losses[name].append(module.loss(module.network(*inputs), truth))
     rows = []

@@ -1,4 +1,5 @@
 import logging
+from types import SimpleNamespace
 
 import pytest
 import torch
@@ -47,3 +48,17 @@ def test_cuda_is_described_with_its_gpu_where_torch_sees_it(monkeypatch) -> None
     assert "Some GPU" not in backend.describe("scalar_rgb")
     monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
     assert backend.describe("cuda_ad_rgb").endswith("cuda_ad_rgb")
+
+
+def test_a_gpu_needs_a_pytorch_that_can_use_it(monkeypatch) -> None:
+    traced = SimpleNamespace(returncode=0, stderr="")
+    monkeypatch.setattr(backend, "_has_driver", True)
+    monkeypatch.setattr(backend.subprocess, "run", lambda *_, **__: traced)
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
+    problem = backend.cuda_problem.__wrapped__()
+    assert problem is not None
+    assert "cannot use it; install a build for CUDA" in problem
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
+    assert backend.cuda_problem.__wrapped__() is None
+    monkeypatch.setattr(backend, "_has_driver", False)
+    assert "no NVIDIA driver" in (backend.cuda_problem.__wrapped__() or "")

@@ -28,6 +28,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import torch
 
 from ngi.durable import write_atomically
 from ngi.render.protocol import Renderer
@@ -68,6 +69,7 @@ def components(settings: Mapping[str, Any], *, renderer: Renderer, scored: bool)
         "buffers": list(renderer.layout.names),
         "dimensions": renderer.dimensions,
         **samples,
+        **_gpu(),
     }
     training = {
         **{part: settings[part] for part in ("model", "loss", "trainer")},
@@ -80,6 +82,7 @@ def components(settings: Mapping[str, Any], *, renderer: Renderer, scored: bool)
         "scene": {"name": settings["scene"]["name"], "hash": renderer.scene_hash},
         "patches": sampler["chains"],
         **samples,
+        **_gpu(),
     }
     found = [
         Component("training", training),
@@ -89,6 +92,11 @@ def components(settings: Mapping[str, Any], *, renderer: Renderer, scored: bool)
     if scored:
         found.append(Component("scoring", {"target": sampler["target"], **training}))
     return found
+
+
+def _gpu() -> dict[str, str]:
+    """What 'auto' means for network and renderer: costs with a GPU are not those without."""
+    return {"gpu": torch.cuda.get_device_name()} if torch.cuda.is_available() else {}
 
 
 def _without(settings: Mapping[str, Any], *keys: str) -> dict[str, Any]:

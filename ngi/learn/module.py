@@ -136,8 +136,8 @@ def seeded(make: Callable[..., T], *, seed: int) -> Callable[..., T]:
     """
 
     def seeded_make(**arguments: Any) -> T:
-        with torch.random.fork_rng():
-            torch.manual_seed(seed)
+        with torch.random.fork_rng(devices=[]):  # weights are made on the CPU
+            torch.default_generator.manual_seed(seed)
             return make(**arguments)
 
     return seeded_make

@@ -129,9 +129,11 @@ def _replayed(function: Trace) -> Trace:
 
 
 def free_memory() -> None:
-    """Gives back what Dr.Jit keeps for later launches, once those under way have ended."""
+    """Gives back what Dr.Jit and PyTorch keep for later, once launches under way have ended."""
     dr.sync_thread()
     dr.flush_malloc_cache()
+    if torch.cuda.is_initialized():
+        torch.cuda.empty_cache()
 
 
 @dataclass(frozen=True)

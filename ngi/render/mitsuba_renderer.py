@@ -184,7 +184,7 @@ class MitsubaRenderer:
         require_positive(resolution=resolution)
         mi.set_variant(self._variant)
         self._scene.apply(scene_vector)
-        return self._encode(self._whole_buffers(resolution)).cpu()
+        return self._encode(self._whole_buffers(resolution))
 
     def cameras(self, scene_vectors: Tensor) -> Tensor:
         """See `ngi.render.Renderer.cameras`."""

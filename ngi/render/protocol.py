@@ -107,6 +107,7 @@ class Renderer(Protocol):
     def image_buffers(self, scene_vector: Tensor, *, resolution: int) -> Tensor:
         """[H, W, C] float32: the first-hit buffers of the same pixels, as `layout` names them.
 
+        On the device that renders, so that a network on the same GPU need not wait for copies.
         Without noise, so there is no seed. A pixel with NaN or Inf is zero in all channels.
         """
         ...

@@ -40,7 +40,7 @@ def sheet(
             )
             tiles.append((f"{title} {index}", srgb_picture(image, 0.0)))
     for title, v in (("random 0", random[0]), ("hard frame 0", hard[0])):
-        buffers = renderer.image_buffers(v, resolution=resolution)
+        buffers = renderer.image_buffers(v, resolution=resolution).cpu()
         for name in renderer.layout.names:
             picture = buffer_picture(name, buffers[..., renderer.layout.slice(name)])
             tiles.append((f"{name}, {title}", picture))

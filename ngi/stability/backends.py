@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-import torch
+from ngi.backend import cuda_problem
 
-BACKENDS = ("llvm", "scalar", *(("cuda",) if torch.cuda.is_available() else ()))
+BACKENDS = ("llvm", "scalar", *(("cuda",) if cuda_problem() is None else ()))

@@ -97,7 +97,7 @@ def _inputs(run: TrainedRun) -> dict[str, tuple[Tensor, Tensor]]:
     pixels = torch.rand(RANDOM_PIXELS, run.renderer.layout.channels, generator=generator)
     v = torch.rand(run.renderer.dimensions, generator=generator)
     hard = run.renderer.hard_frames()[0]
-    frame = run.renderer.image_buffers(hard, resolution=run.protocol.resolution)
+    frame = run.renderer.image_buffers(hard, resolution=run.protocol.resolution).cpu()
     size = f"{run.protocol.resolution} × {run.protocol.resolution}"
     return {
         f"{RANDOM_PIXELS} random pixels": (pixels, v),

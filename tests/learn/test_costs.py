@@ -7,6 +7,7 @@ from multiprocessing import get_context
 from pathlib import Path
 
 import pytest
+import torch
 
 from ngi.build import run_components
 from ngi.learn import Component, CostFile, ModelClock
@@ -98,6 +99,14 @@ def test_a_cost_is_known_by_what_it_depends_on(override: str, changed: set[str])
 
 def test_scenes_of_other_dimensions_share_nothing() -> None:
     assert not {*keys().values()} & {*keys(dimensions=4).values()}
+
+
+def test_costs_with_a_gpu_are_not_those_without(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
+    without = keys.__wrapped__()
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
+    monkeypatch.setattr(torch.cuda, "get_device_name", lambda: "Some GPU")
+    assert all(key != without[name] for name, key in keys.__wrapped__().items())
 
 
 def test_the_file_keeps_medians_and_quartiles(tmp_path: Path) -> None:
