@@ -41,7 +41,7 @@ class TestSet:
     @torch.no_grad()
     def errors(self, network: nn.Module) -> dict[str, float]:
         """Mean error over the frames everywhere, in the pockets, and over the tail of them all."""
-        device = next(network.parameters()).device
+        device = next((weight.device for weight in network.parameters()), self._buffers.device)
         prediction = network(self._buffers.to(device), self._scene_vectors.to(device)).cpu()
         errors = (prediction - self._log_radiance).abs().mean(dim=(1, 2, 3))
         tail = errors.topk(math.ceil(TAIL * len(errors))).values
