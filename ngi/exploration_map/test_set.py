@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import torch
-from torch import nn
+from torch import Tensor
 from torch.quasirandom import SobolEngine
 
 from ngi.render import PocketRenderer
@@ -39,10 +40,12 @@ class TestSet:
         self._log_radiance = torch.stack([radiance for _, radiance in images]).log1p()
 
     @torch.no_grad()
-    def errors(self, network: nn.Module) -> dict[str, float]:
-        """Mean error over the frames everywhere, in the pockets, and over the tail of them all."""
-        device = next((weight.device for weight in network.parameters()), self._buffers.device)
-        prediction = network(self._buffers.to(device), self._scene_vectors.to(device)).cpu()
+    def errors(self, network: Callable[[Tensor, Tensor], Tensor]) -> dict[str, float]:
+        """Mean error over the frames everywhere, in the pockets, and over the tail of them all.
+
+        network: buffers [n, H, W, C] and v [n, D] to log1p radiance [n, H, W, 3], all on the CPU
+        """
+        prediction = network(self._buffers, self._scene_vectors)
         errors = (prediction - self._log_radiance).abs().mean(dim=(1, 2, 3))
         tail = errors.topk(math.ceil(TAIL * len(errors))).values
         return {

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from statistics import mean
 from tempfile import TemporaryDirectory
@@ -149,7 +150,13 @@ class _Test(Callback):
     def on_train_batch_end(self, trainer: Trainer, module: Any, *_: Any) -> None:
         left = self._last_step - trainer.global_step
         if left % BETWEEN == 0 and left < TESTS * BETWEEN:
-            self._errors.append(self._test_set.errors(module.network)["error_uniform"])
+            self._errors.append(self._test_set.errors(partial(_on_cpu, module))["error_uniform"])
+
+
+def _on_cpu(module: Any, *inputs: Tensor) -> Tensor:
+    """What its network says, which may be on a GPU."""
+    output: Tensor = module.network(*(tensor.to(module.device) for tensor in inputs))
+    return output.cpu()
 
 
 class _Disturbed:
