@@ -19,7 +19,7 @@ from functools import cache
 from ngi.llvm import INSTALL_COMMAND, find_llvm, llvm_candidates
 
 LIBCUDA = "libcuda.so.1"
-"""The driver's name wherever one is installed; Dr.Jit looks for libcuda.so, in /usr/lib only."""
+"""The driver's name wherever one is installed; Dr.Jit itself tries libcuda.so, then /usr/lib."""
 
 
 def _can_be_loaded(library: str) -> bool:
@@ -30,7 +30,7 @@ def _can_be_loaded(library: str) -> bool:
     return True
 
 
-_has_driver = _can_be_loaded(LIBCUDA)
+_has_driver = _can_be_loaded(os.environ.get("DRJIT_LIBCUDA_PATH") or LIBCUDA)
 if _has_driver:
     os.environ.setdefault("DRJIT_LIBCUDA_PATH", LIBCUDA)
 _llvm = find_llvm()

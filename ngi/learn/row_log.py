@@ -15,7 +15,8 @@ class RowLog(GrowingFile[TextIO]):
     """Rows with a `step` column, appended to a CSV file.
 
     The columns are those of the file, or else of the first row; values missing later stay empty.
-    Raises ValueError for a row with a column the file does not have.
+    Raises ValueError for a row with a column that the first row did not have. In a file that is
+    continued, which an older version may have begun, such values are left out.
     """
 
     def __init__(self, path: Path) -> None:
@@ -58,6 +59,12 @@ class RowLog(GrowingFile[TextIO]):
             with self.path.open(newline="") as stream:
                 columns = next(csv.reader(stream))
         self._stream = self.path.open("a", newline="")
-        self._writer = csv.DictWriter(self._stream, columns, restval="", lineterminator="\n")
+        self._writer = csv.DictWriter(
+            self._stream,
+            columns,
+            restval="",
+            extrasaction="ignore" if continued else "raise",
+            lineterminator="\n",
+        )
         if not continued:
             self._writer.writeheader()

@@ -58,3 +58,11 @@ def test_missing_values_stay_empty_and_unknown_columns_are_refused(tmp_path: Pat
 def test_no_file_is_made_by_cutting_back(tmp_path: Path) -> None:
     RowLog(tmp_path / "log.csv").keep_until(3)
     assert not (tmp_path / "log.csv").exists()
+
+
+def test_a_log_that_an_older_version_began_is_continued(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("step,loss\n1,0.5\n")
+    write(tmp_path / "log.csv", range(2, 4)).close()
+    table = pd.read_csv(tmp_path / "log.csv")
+    assert list(table) == ["step", "loss"]
+    assert table["loss"].tolist() == [0.5, 2 / 8, 3 / 8]
