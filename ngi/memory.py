@@ -6,6 +6,7 @@ import ctypes
 import os
 import sys
 from pathlib import Path
+from typing import Any
 
 M_TRIM_THRESHOLD, M_TOP_PAD, M_MMAP_THRESHOLD = -1, -2, -3  # of glibc's malloc.h
 
@@ -17,9 +18,7 @@ def keep_freed_memory() -> None:
     mapped and zeroed anew each time, which took a fifth of a 6x128 step on two cores. Does
     nothing where the C library is another one.
     """
-    if not sys.platform.startswith("linux"):
-        return
-    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
+    mallopt = _of_c_library("mallopt")
     if mallopt is None:
         return
     mallopt(M_MMAP_THRESHOLD, 32 * 2**20)  # the largest it accepts
@@ -53,9 +52,16 @@ def allocated_bytes() -> int | None:
     None where the C library is not glibc 2.33 or newer. `resident_bytes` holds freed memory too,
     which stays, and goes up whenever the heap's so far untouched part is touched.
     """
-    mallinfo2 = getattr(ctypes.CDLL(None), "mallinfo2", None) if sys.platform == "linux" else None
+    mallinfo2 = _of_c_library("mallinfo2")
     if mallinfo2 is None:
         return None
     mallinfo2.restype = _Mallinfo2
     found = mallinfo2()
     return int(found.uordblks + found.hblkhd)
+
+
+def _of_c_library(name: str) -> Any:
+    """One of its functions; None where it has none of that name, or the system is not Linux."""
+    if not sys.platform.startswith("linux"):
+        return None
+    return getattr(ctypes.CDLL(None), name, None)
