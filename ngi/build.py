@@ -55,7 +55,7 @@ def build_module(
 
     return learn.IlluminationModule(
         network=learn.seeded(instantiate(config.model), seed=config.seed)(
-            layout=samples.layout, scene_dimensions=samples.dimensions
+            layout=samples.layout, scene_dimensions=samples.network_dimensions
         ),
         loss=instantiate(config.loss),
         optimizer=instantiate(config.optimizer),

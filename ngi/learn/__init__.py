@@ -15,7 +15,7 @@ from ngi.learn.record_log import RecordLog
 from ngi.learn.recorder import Recorder
 from ngi.learn.row_log import RowLog
 from ngi.learn.run_folder import RunFolder
-from ngi.learn.samples import Example, PatchSamples, Samples
+from ngi.learn.samples import Example, PatchSamples, Samples, patch_example
 from ngi.learn.scorer import Scorer
 from ngi.learn.sequences import Sequences
 from ngi.learn.step_guard import LARGEST_NORM, StepGuard, gradient_norm
@@ -62,6 +62,7 @@ __all__ = [
     "callbacks",
     "components",
     "gradient_norm",
+    "patch_example",
     "prepare_resume",
     "read_checkpoint",
     "seeded",

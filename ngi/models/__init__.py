@@ -2,6 +2,7 @@
 
 from ngi.models.anf import AffinityDenoiser
 from ngi.models.cnsr import CNSR
+from ngi.models.encoded_generator import EncodedGenerator
 from ngi.models.image_layers import ImageLinear
 from ngi.models.loss import L1Dssim, SampleLoss
 from ngi.models.patch_linear import PatchLinear
@@ -16,6 +17,7 @@ from ngi.models.sequence_loss import SequenceSmape
 __all__ = [
     "CNSR",
     "AffinityDenoiser",
+    "EncodedGenerator",
     "ImageLinear",
     "L1Dssim",
     "PatchLinear",

@@ -71,7 +71,7 @@ class TrainedRun:
         network = made_by(settings, "model")(
             **plain(settings["model"]),
             layout=samples.layout,
-            scene_dimensions=samples.dimensions,
+            scene_dimensions=samples.network_dimensions,
         )
         weights = {
             name.removeprefix(NETWORK): value

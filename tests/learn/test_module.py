@@ -5,7 +5,7 @@ import torch
 from torch.func import grad
 
 from ngi.explore import Loss, LossTimesOutputGradient, LossTimesStep, Target
-from ngi.learn import Batch, IlluminationModule, PatchSamples, PhaseClock, seeded
+from ngi.learn import Batch, IlluminationModule, PhaseClock, patch_example, seeded
 from ngi.models import L1Dssim, PixelGenerator, adam_step_norm
 from ngi.patches import BufferLayout, Patches
 
@@ -39,7 +39,7 @@ def module(target: Target) -> IlluminationModule:
         optimizer=lambda parameters: torch.optim.Adam(parameters, lr=1e-2),
         target=target,
         clock=PhaseClock(),
-        example=PatchSamples.example,
+        example=patch_example,
     )
     optimizer = made.configure_optimizers()
     made.optimizers = lambda **_: optimizer  # type: ignore[method-assign]

@@ -17,9 +17,9 @@ from ngi.explore import LossTimesStep
 from ngi.learn import (
     ExplorationDataModule,
     IlluminationModule,
-    PatchSamples,
     PhaseClock,
     StepGuard,
+    patch_example,
     seeded,
 )
 from ngi.learn.lightning_api import Callback, Trainer
@@ -83,7 +83,7 @@ def train(
         optimizer=lambda parameters: torch.optim.Adam(parameters, lr=1e-2),
         target=LossTimesStep(),
         clock=PhaseClock(),
-        example=PatchSamples.example,
+        example=patch_example,
     )
     count = iter(range(1, steps + 1))
     module.network.output_layer.weight.register_hook(lambda g: gradient(next(count), g))
