@@ -2,7 +2,7 @@
 
 from ngi.learn.batch import Batch, Counters, Feedback
 from ngi.learn.budget import Budget
-from ngi.learn.callbacks import SamplerFeedback, callbacks
+from ngi.learn.callbacks import LearningRate, SamplerFeedback, callbacks
 from ngi.learn.checkpoint import AtomicCheckpointIO, prepare_resume, read_checkpoint
 from ngi.learn.clock import PhaseClock, RunClock
 from ngi.learn.costs import Component, CostFile, Costs, components
@@ -16,6 +16,7 @@ from ngi.learn.recorder import Recorder
 from ngi.learn.row_log import RowLog
 from ngi.learn.run_folder import RunFolder
 from ngi.learn.samples import Example, PatchSamples, Samples
+from ngi.learn.schedule import ConstantRate, Schedule, WarmupStableDecay
 from ngi.learn.scorer import Scorer
 from ngi.learn.sequences import Sequences
 from ngi.learn.step_guard import LARGEST_NORM, StepGuard, gradient_norm
@@ -30,6 +31,7 @@ __all__ = [
     "Batch",
     "Budget",
     "Component",
+    "ConstantRate",
     "CostFile",
     "Costs",
     "Counters",
@@ -39,6 +41,7 @@ __all__ = [
     "IlluminationModule",
     "Interrupted",
     "Interruption",
+    "LearningRate",
     "Local",
     "ModelClock",
     "ObservationSets",
@@ -52,12 +55,14 @@ __all__ = [
     "RunFolder",
     "SamplerFeedback",
     "Samples",
+    "Schedule",
     "Scorer",
     "Sequences",
     "StepGuard",
     "TargetMap",
     "Tracker",
     "TrainingStream",
+    "WarmupStableDecay",
     "WeightsAndBiases",
     "callbacks",
     "components",

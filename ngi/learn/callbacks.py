@@ -16,6 +16,7 @@ from ngi.learn.lightning_api import Callback, LightningModule, Trainer
 from ngi.learn.recorder import Recorder
 from ngi.learn.run_folder import RunFolder
 from ngi.learn.saving import BudgetAndCheckpoint, budget_used
+from ngi.learn.schedule import Schedule
 from ngi.learn.step_guard import StepGuard
 from ngi.learn.stream import TrainingStream
 from ngi.learn.tracker import Tracker
@@ -79,6 +80,41 @@ class SamplerFeedback(Callback):
         self._clock.load_state_dict(state_dict)
 
 
+class LearningRate(Callback):
+    """Sets the optimiser's learning rates for the next step, once the sampler has its feedback.
+
+    They depend on the steps and the clock that a checkpoint holds, and on nothing before, so that a
+    run that goes on goes on as one that was not broken off.
+    """
+
+    def __init__(
+        self, *, schedule: Schedule, budget: Budget, stream: TrainingStream, run_clock: RunClock
+    ) -> None:
+        self._schedule = schedule
+        self._budget = budget
+        self._stream = stream
+        self._run_clock = run_clock
+        self._rates: list[float] = []
+
+    def on_fit_start(self, trainer: Trainer, _module: LightningModule) -> None:
+        # As configured: the checkpoint, whose rates may have fallen already, is not loaded yet.
+        self._rates = [group["lr"] for group in _groups(trainer)]
+
+    def on_train_start(self, trainer: Trainer, *_: Any) -> None:
+        self._set(trainer)
+
+    def on_train_batch_end(self, trainer: Trainer, *_: Any) -> None:
+        self._set(trainer)
+
+    def _set(self, trainer: Trainer) -> None:
+        factor = self._schedule.factor(
+            steps=self._stream.counters.iteration,
+            used=budget_used(self._budget, self._stream, self._run_clock),
+        )
+        for group, rate in zip(_groups(trainer), self._rates, strict=True):
+            group["lr"] = rate * factor
+
+
 class PeriodicEvaluation(Callback):
     """Evaluates `count` times, evenly over the budget; the last of them is left to the caller."""
 
@@ -101,6 +137,8 @@ class PeriodicEvaluation(Callback):
         self._done = 0
 
     def on_train_start(self, *_: Any) -> None:
+        # A run that is trained longer has been evaluated more often by now than it would have been.
+        self._done = min(self._done, self._due)
         self._evaluate_if_due()  # a signal came at this very step, before it was evaluated
 
     def on_train_batch_end(self, *_: Any) -> None:
@@ -113,12 +151,22 @@ class PeriodicEvaluation(Callback):
         self._done = state_dict["done"]
 
     def _evaluate_if_due(self) -> None:
-        used = budget_used(self._budget, self._stream, self._run_clock)
-        due = int(used * self._count)
-        if used < 1 and due > self._done:
+        due = self._due
+        if self._done < due < self._count:
             self._stream.finish_rendering()
             self._recorder.evaluate()
             self._done = due
+
+    @property
+    def _due(self) -> int:
+        """Evaluations by now; the last of them once the budget is used up."""
+        used = budget_used(self._budget, self._stream, self._run_clock)
+        return int(used * self._count)
+
+
+def _groups(trainer: Trainer) -> list[dict[str, Any]]:
+    (optimizer,) = trainer.optimizers
+    return optimizer.param_groups
 
 
 def callbacks(
@@ -129,6 +177,7 @@ def callbacks(
     folder: RunFolder,
     tracker: Tracker,
     budget: Budget,
+    schedule: Schedule,
     recorder: Recorder,
     evaluations: int,
     checkpoint_seconds: float,
@@ -150,11 +199,13 @@ def callbacks(
             tracker=tracker,
             guard=guard,
         ),
+        LearningRate(schedule=schedule, budget=budget, stream=stream, run_clock=run_clock),
         PeriodicEvaluation(
             recorder=recorder, count=evaluations, budget=budget, stream=stream, run_clock=run_clock
         ),
         BudgetAndCheckpoint(
             budget=budget,
+            schedule=schedule,
             stream=stream,
             clock=clock,
             run_clock=run_clock,

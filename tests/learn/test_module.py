@@ -6,7 +6,7 @@ from torch.func import grad
 
 from ngi.explore import Loss, LossTimesOutputGradient, LossTimesStep, Target
 from ngi.learn import Batch, IlluminationModule, PatchSamples, PhaseClock, seeded
-from ngi.models import L1Dssim, PixelGenerator, adam_step_norm
+from ngi.models import L1Dssim, PixelGenerator, sample_step_norm
 from ngi.patches import BufferLayout, Patches
 
 LAYOUT = BufferLayout()
@@ -54,7 +54,7 @@ def direct_scores(made: IlluminationModule, target: Target, samples: Patches) ->
     if isinstance(target, Loss):
         return losses
     if isinstance(target, LossTimesStep):
-        _, norms = adam_step_norm(
+        _, norms = sample_step_norm(
             made.network,
             LOSS,
             made.optimizers(),  # type: ignore[arg-type]

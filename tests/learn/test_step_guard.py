@@ -203,7 +203,7 @@ def test_moments_that_hold_nan_never_reach_the_weights(tmp_path: Path) -> None:
             for state in list(trainer.optimizers[0].state.values())[:1]:
                 state["exp_avg_sq"].flatten()[0] = math.nan
 
-    with pytest.raises(FloatingPointError, match="Adam's moments hold NaN or Inf"):
+    with pytest.raises(FloatingPointError, match="moments hold NaN or Inf"):
         train(tmp_path, 30, callbacks=[Poison()])
     report = torch.load(tmp_path / "refused_step.pt", weights_only=True)
     assert report["step"] == 1 + REFUSED_IN_A_ROW  # before the first there are no moments
