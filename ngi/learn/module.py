@@ -83,7 +83,7 @@ class IlluminationModule(LightningModule):
         return {"loss": weighted.mean(), "feedback": feedback}
 
     def optimizer_step(self, *arguments: Any, **options: Any) -> None:
-        """Lightning's, and the average takes part in it: within the time that counts as training."""
+        """Lightning's, and the average follows: within the time that counts as training."""
         super().optimizer_step(*arguments, **options)
         if self.averaged is not None:
             self.averaged.update_parameters(self.network)

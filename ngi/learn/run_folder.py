@@ -130,7 +130,7 @@ class RunFolder:
 
 
 def _longer(settings: dict[str, Any], *, than: dict[str, Any]) -> bool:
-    """Whether these are the settings of the same run with a larger budget, and of one that trains."""
+    """Whether these are settings of the same run with a larger budget, and it trains."""
     (now, limits), (earlier, former) = map(_without_limits, (settings, than))
     if now != earlier or "path_tracing" in now or limits == former:
         return False

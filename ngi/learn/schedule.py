@@ -12,7 +12,7 @@ class Schedule(Protocol):
     """By what the optimiser's learning rates are multiplied."""
 
     def factor(self, *, steps: int, used: float) -> float:
-        """For the next step. steps: taken so far; used: of the budget, 0 to 1, by the run's clock."""
+        """For the next step. steps: taken so far; used: share of the budget, by the run's clock."""
         ...
 
     def decays(self, used: float) -> bool:

@@ -39,7 +39,7 @@ AVERAGED = 100
 """Steps that the average, of the norms' logarithms, goes back."""
 
 REPORT = "refused_step.pt"
-"""File for the weights, the optimiser's moments, the batch and its losses; `torch.load` reads it."""
+"""File for the weights, the moments, the batch and its losses; `torch.load` reads it."""
 
 REFUSED_IN_A_ROW = 10
 """Steps after which no other batch will help: the run stops."""

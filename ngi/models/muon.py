@@ -24,8 +24,8 @@ class MuonAdam(torch.optim.Optimizer):
 
     Adam lets the rank of a ReLU network's hidden layers collapse, which is what looks like spectral
     bias (arXiv 2512.14366); Muon orthogonalises the momentum of each matrix (Jordan et al. 2024),
-    so that no direction is left behind. Nesterov momentum, no weight decay, and steps of Adam's size
-    (Liu et al. 2025, arXiv 2502.16982): 0.2 `lr` is the root mean square of an entry's change.
+    so that no direction is left behind. Nesterov momentum, no weight decay, and steps of Adam's
+    size (Liu et al. 2025, arXiv 2502.16982): an entry's change has the root mean square 0.2 `lr`.
 
     To everybody else it is one optimiser: `param_groups` and `state` hold both parts, which share
     them, so that a learning rate set there counts, and checkpoints hold all there is. The entry

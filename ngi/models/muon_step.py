@@ -17,7 +17,7 @@ RMS = 0.2
 
 @dataclass(frozen=True)
 class MuonStep:
-    """What one sample would do to a weight matrix under `MuonAdam`, as a function of its gradient g.
+    """What a sample would do to a weight matrix under `MuonAdam`, as a function of its gradient g.
 
     The exploration target asks how far a sample alone would move the network (paper, Sec. 5.1).
     Muon's true answer is the same for every sample: it orthogonalises U(g) = β²·B + (1 − β²)·g (B

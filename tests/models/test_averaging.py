@@ -53,5 +53,5 @@ def test_the_paper_averages_nothing() -> None:
 
 @pytest.mark.parametrize("decay", [-0.1, 1.0, float("nan")])
 def test_a_decay_out_of_range_is_named(decay: float) -> None:
-    with pytest.raises(ValueError, match="averaging.decay"):
+    with pytest.raises(ValueError, match=r"averaging\.decay"):
         exponential_average(nn.Linear(1, 1), decay=decay)
