@@ -2,12 +2,13 @@
 
 from ngi.learn.batch import Batch, Counters, Feedback
 from ngi.learn.budget import Budget
-from ngi.learn.callbacks import LearningRate, SamplerFeedback, callbacks
+from ngi.learn.callbacks import SamplerFeedback, callbacks
 from ngi.learn.checkpoint import AtomicCheckpointIO, prepare_resume, read_checkpoint
 from ngi.learn.clock import PhaseClock, RunClock
 from ngi.learn.costs import Component, CostFile, Costs, components
 from ngi.learn.datamodule import ExplorationDataModule
 from ngi.learn.interruption import Interrupted, Interruption
+from ngi.learn.learning_rate import LearningRate
 from ngi.learn.model_clock import ModelClock
 from ngi.learn.module import IlluminationModule, seeded
 from ngi.learn.observation_sets import ObservationSets

@@ -12,6 +12,7 @@ from typing import Any
 from ngi.learn.budget import Budget
 from ngi.learn.clock import PhaseClock, RunClock
 from ngi.learn.interruption import Interruption
+from ngi.learn.learning_rate import LearningRate
 from ngi.learn.lightning_api import Callback, LightningModule, Trainer
 from ngi.learn.recorder import Recorder
 from ngi.learn.run_folder import RunFolder
@@ -80,41 +81,6 @@ class SamplerFeedback(Callback):
         self._clock.load_state_dict(state_dict)
 
 
-class LearningRate(Callback):
-    """Sets the optimiser's learning rates for the next step, once the sampler has its feedback.
-
-    They depend on the steps and the clock that a checkpoint holds, and on nothing before, so that a
-    run that goes on goes on as one that was not broken off.
-    """
-
-    def __init__(
-        self, *, schedule: Schedule, budget: Budget, stream: TrainingStream, run_clock: RunClock
-    ) -> None:
-        self._schedule = schedule
-        self._budget = budget
-        self._stream = stream
-        self._run_clock = run_clock
-        self._rates: list[float] = []
-
-    def on_fit_start(self, trainer: Trainer, _module: LightningModule) -> None:
-        # As configured: the checkpoint, whose rates may have fallen already, is not loaded yet.
-        self._rates = [group["lr"] for group in _groups(trainer)]
-
-    def on_train_start(self, trainer: Trainer, *_: Any) -> None:
-        self._set(trainer)
-
-    def on_train_batch_end(self, trainer: Trainer, *_: Any) -> None:
-        self._set(trainer)
-
-    def _set(self, trainer: Trainer) -> None:
-        factor = self._schedule.factor(
-            steps=self._stream.counters.iteration,
-            used=budget_used(self._budget, self._stream, self._run_clock),
-        )
-        for group, rate in zip(_groups(trainer), self._rates, strict=True):
-            group["lr"] = rate * factor
-
-
 class PeriodicEvaluation(Callback):
     """Evaluates `count` times, evenly over the budget; the last of them is left to the caller."""
 
@@ -162,11 +128,6 @@ class PeriodicEvaluation(Callback):
         """Evaluations by now; the last of them once the budget is used up."""
         used = budget_used(self._budget, self._stream, self._run_clock)
         return int(used * self._count)
-
-
-def _groups(trainer: Trainer) -> list[dict[str, Any]]:
-    (optimizer,) = trainer.optimizers
-    return optimizer.param_groups
 
 
 def callbacks(
