@@ -62,6 +62,7 @@ def build_module(
         target=target,
         clock=clock,
         example=samples.example,
+        averaging=instantiate(config.averaging),
     )
 
 

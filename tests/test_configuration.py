@@ -19,7 +19,7 @@ from ngi.resources import root, scene_folders
 CONF = root() / "conf"
 GROUPS = (
     *("sampler", "reuse", "resolution", "data", "model"),
-    *("loss", "optimizer", "budget", "tracker"),
+    *("loss", "optimizer", "schedule", "averaging", "budget", "tracker"),
 )
 OPTIONS = [(g, f.stem) for g in GROUPS for f in sorted((CONF / g).glob("*.yaml"))]
 
@@ -63,7 +63,9 @@ def test_the_defaults_are_the_papers() -> None:
     assert isinstance(network, PixelGenerator)
     assert len(network.hidden) + 1 == 8
     assert config.model.hidden_features == 512
-    assert config.optimizer.lr == 1e-4
+    assert config.optimizer == {"_target_": "torch.optim.Adam", "_partial_": True, "lr": 1e-4}
+    assert instantiate(config.schedule).factor(steps=0, used=0.99) == 1
+    assert instantiate(config.averaging)(network) is None
     assert config.reuse.policy.beta == 4.6
     assert config.reuse.policy.bootstrap_batches == 100
     assert config.sampler.proposal.large_step_probability == 0.3
@@ -75,6 +77,16 @@ def test_the_defaults_are_the_papers() -> None:
         600,
         600,
     ]
+
+
+@pytest.mark.parametrize(
+    ("size", "rate"),
+    [("budget=small", 1e-3), ("experiment=exploration_map", 2e-3), ("budget=smoke", 1e-4)],
+)
+def test_a_size_has_adams_rate_and_leaves_others_alone(size: str, rate: float) -> None:
+    assert composed(size).optimizer.lr == rate
+    assert composed(size).optimizer.keys() == {"_target_", "_partial_", "lr"}
+    assert composed(size, "optimizer=muon").optimizer == composed("optimizer=muon").optimizer
 
 
 PRECONDITIONED, PLAIN = "pixel_generator", "pixel_generator_no_preconditioning"
