@@ -28,6 +28,10 @@ class PixelGenerator(nn.Module):
     included, sees [hidden features, all buffers, v]. Emission is no input: it is passed through,
     in log1p space, by where(emission > 1, emission, output + emission).
 
+    Where the layout has direct light, that is an input, and what the output is added to: in place
+    of output + emission there stands output + log1p(expm1(emission) + expm1(direct)). The network
+    then has to tell the indirect light only.
+
     layout: the buffers of the scene
     scene_dimensions: D, the length of the scene vector v; may be 0
     hidden_features: width of every hidden layer
@@ -107,7 +111,7 @@ class PixelGenerator(nn.Module):
         for layer in self.hidden:
             features = self._activate(layer((features, inputs), scene_vector))
         output = self.output_layer((features, inputs), scene_vector).to(buffers.dtype)
-        return self._pass_emission_through(output.unflatten(1, buffers.shape[1:3]), buffers)
+        return self._add_known_light(output.unflatten(1, buffers.shape[1:3]), buffers)
 
     @torch.no_grad()
     def render(
@@ -137,7 +141,7 @@ class PixelGenerator(nn.Module):
             chunks = buffers.flatten(0, 1).split(size)
             output = torch.cat([self._render_pixels(chunk, layers) for chunk in chunks])
         output = output.to(buffers.dtype).unflatten(0, buffers.shape[:2])
-        return self._pass_emission_through(output, buffers)
+        return self._add_known_light(output, buffers)
 
     def _render_pixels(self, pixels: Tensor, layers: Sequence[ImageLinear]) -> Tensor:
         """Buffers [p, C] to the last layer's output [p, 3]."""
@@ -163,11 +167,20 @@ class PixelGenerator(nn.Module):
         # step spends beside its matrix products.
         return F.leaky_relu(features, self.negative_slope, inplace=True)
 
-    def _pass_emission_through(self, output: Tensor, buffers: Tensor) -> Tensor:
-        if "emission" not in self.layout.names:
+    def _add_known_light(self, output: Tensor, buffers: Tensor) -> Tensor:
+        """Emission and direct light, as far as the scene carries them."""
+        known = {
+            name: buffers[..., self.layout.slice(name)]
+            for name in ("direct", "emission")
+            if name in self.layout.names
+        }
+        if len(known) == 2:  # they add up as radiance, not as its logarithm
+            output = output + torch.log1p(known["direct"].expm1() + known["emission"].expm1())
+        elif known:
+            output = output + next(iter(known.values()))
+        if "emission" not in known:
             return output
-        emission = buffers[..., self.layout.slice("emission")]
-        return torch.where(emission > EMITTER_THRESHOLD, emission, output + emission)
+        return torch.where(known["emission"] > EMITTER_THRESHOLD, known["emission"], output)
 
     def _check(self, buffers: Tensor, scene_vector: Tensor) -> None:
         if buffers.ndim != 4 or buffers.shape[-1] != self.layout.channels:

@@ -89,6 +89,7 @@ def test_methods_share_what_they_have_in_common() -> None:
         ("model.hidden_features=16", {"training", "scoring"}),
         ("trainer=bf16", {"training", "scoring"}),
         ("+renderer.samples_per_pixel=9", {"rendering"}),
+        ("+renderer.direct=traced", {"rendering"}),
         ("sampler.chains=8", {"training", "exploring", "rendering", "scoring"}),
     ],
 )
