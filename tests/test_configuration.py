@@ -92,22 +92,23 @@ def test_a_size_has_adams_rate_and_leaves_others_alone(size: str, rate: float) -
 PRECONDITIONED, PLAIN = "pixel_generator", "pixel_generator_no_preconditioning"
 COMPETITORS = ("cnsr", "anf")
 """Other methods, whose samples are of another size."""
-METHODS = {  # sampler, resolution, model, specular
-    "active_exploration": ("mcmc_loss_step", "growing", PRECONDITIONED, "learned"),
-    "uniform": ("uniform", "constant", PRECONDITIONED, "learned"),
-    "uniform_growing": ("uniform", "growing", PRECONDITIONED, "learned"),
-    "sobol": ("sobol", "constant", PRECONDITIONED, "learned"),
-    "latin_hypercube": ("latin_hypercube", "constant", PRECONDITIONED, "learned"),
-    "fixed_data": ("uniform", "constant", PRECONDITIONED, "learned"),
-    "prioritised_replay": ("uniform", "constant", PRECONDITIONED, "learned"),
-    "constant_resolution": ("mcmc_loss_step", "constant", PRECONDITIONED, "learned"),
-    "loss_target": ("mcmc_loss", "growing", PRECONDITIONED, "learned"),
-    "output_gradient_target": ("mcmc_output_gradient", "growing", PRECONDITIONED, "learned"),
-    "metropolis": ("mcmc_metropolis", "growing", PRECONDITIONED, "learned"),
-    "no_preconditioning": ("mcmc_loss_step", "growing", PLAIN, "learned"),
-    "cnsr": ("uniform", "constant", "cnsr", "learned"),
-    "anf": ("uniform", "constant", "anf", "learned"),
-    "traced_specular": ("mcmc_loss_step", "growing", PRECONDITIONED, "traced"),
+METHODS = {  # sampler, resolution, model, what the renderer traces into the buffers
+    "active_exploration": ("mcmc_loss_step", "growing", PRECONDITIONED, []),
+    "uniform": ("uniform", "constant", PRECONDITIONED, []),
+    "uniform_growing": ("uniform", "growing", PRECONDITIONED, []),
+    "sobol": ("sobol", "constant", PRECONDITIONED, []),
+    "latin_hypercube": ("latin_hypercube", "constant", PRECONDITIONED, []),
+    "fixed_data": ("uniform", "constant", PRECONDITIONED, []),
+    "prioritised_replay": ("uniform", "constant", PRECONDITIONED, []),
+    "constant_resolution": ("mcmc_loss_step", "constant", PRECONDITIONED, []),
+    "loss_target": ("mcmc_loss", "growing", PRECONDITIONED, []),
+    "output_gradient_target": ("mcmc_output_gradient", "growing", PRECONDITIONED, []),
+    "metropolis": ("mcmc_metropolis", "growing", PRECONDITIONED, []),
+    "no_preconditioning": ("mcmc_loss_step", "growing", PLAIN, []),
+    "cnsr": ("uniform", "constant", "cnsr", []),
+    "anf": ("uniform", "constant", "anf", []),
+    "traced_specular": ("mcmc_loss_step", "growing", PRECONDITIONED, ["specular"]),
+    "traced_direct": ("mcmc_loss_step", "growing", PRECONDITIONED, ["direct"]),
 }
 PRIORITISED = {"_target_": "ngi.reuse.Prioritised", "alpha": 0.6, "beta": 0.4, "epsilon": 1e-6}
 
@@ -140,7 +141,8 @@ def test_path_tracing_takes_the_place_of_training_and_changes_nothing_else(metho
 def test_a_method_differs_where_its_name_says_and_nowhere_else(method: str) -> None:
     config = composed(f"method={method}", "budget=small")
     chosen = config.hydra.runtime.choices
-    found = (chosen.sampler, chosen.resolution, chosen.model, config.renderer.specular)
+    traced = [name for name in ("specular", "direct") if config.renderer[name] == "traced"]
+    found = (chosen.sampler, chosen.resolution, chosen.model, traced)
     assert found == METHODS[method]
     assert config.label.method == method
     other = composed("budget=small")

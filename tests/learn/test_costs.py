@@ -93,6 +93,7 @@ def test_methods_share_what_they_have_in_common() -> None:
         ("averaging=exponential", {"training", "scoring"}),
         ("schedule=warmup_stable_decay", set()),
         ("+renderer.samples_per_pixel=9", {"rendering"}),
+        ("+renderer.direct=traced", {"rendering"}),
         ("sampler.chains=8", {"training", "exploring", "rendering", "scoring"}),
     ],
 )
