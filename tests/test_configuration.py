@@ -92,6 +92,7 @@ def test_a_size_has_adams_rate_and_leaves_others_alone(size: str, rate: float) -
 PRECONDITIONED, PLAIN = "pixel_generator", "pixel_generator_no_preconditioning"
 COMPETITORS = ("cnsr", "anf")
 """Other methods, whose samples are of another size."""
+OURS = ("ours", "ours_uniform")
 METHODS = {  # sampler, resolution, model, what the renderer traces into the buffers
     "active_exploration": ("mcmc_loss_step", "growing", PRECONDITIONED, []),
     "uniform": ("uniform", "constant", PRECONDITIONED, []),
@@ -108,6 +109,8 @@ METHODS = {  # sampler, resolution, model, what the renderer traces into the buf
     "cnsr": ("uniform", "constant", "cnsr", []),
     "anf": ("uniform", "constant", "anf", []),
     "traced_specular": ("mcmc_loss_step", "growing", PRECONDITIONED, ["specular"]),
+    "ours": ("sobol", "constant", "encoded_generator", ["direct"]),
+    "ours_uniform": ("uniform", "constant", "encoded_generator", ["direct"]),
     "traced_direct": ("mcmc_loss_step", "growing", PRECONDITIONED, ["direct"]),
 }
 PRIORITISED = {"_target_": "ngi.reuse.Prioritised", "alpha": 0.6, "beta": 0.4, "epsilon": 1e-6}
@@ -151,10 +154,32 @@ def test_a_method_differs_where_its_name_says_and_nowhere_else(method: str) -> N
     if method == "prioritised_replay":
         with open_dict(other):
             other.reuse.store.rule = PRIORITISED
-    parts = ("scene", "optimizer", "budget", "evaluation", "trainer")
+    parts = ("scene", "budget", "evaluation", "trainer")
     own = () if method in COMPETITORS else ("data", "reuse", "loss")
+    own = ("loss",) if method in OURS else ("optimizer", "schedule", "averaging", *own)
     for part in (*parts, *own):
         assert config[part] == other[part], part
+
+
+@pytest.mark.parametrize("method", OURS)
+def test_ours_differs_in_every_part_that_can_be_taken_out_again(method: str) -> None:
+    chosen = composed(f"method={method}", "budget=small").hydra.runtime.choices
+    parts = ("optimizer", "schedule", "averaging", "data", "reuse")
+    options = {part: chosen[part] for part in parts}
+    assert options == {
+        "optimizer": "muon",
+        "schedule": "warmup_stable_decay",
+        "averaging": "exponential",
+        "data": "denoised_patches",
+        "reuse": "steady",
+    }
+
+
+def test_ours_trains_on_images_as_large_as_those_that_are_shown() -> None:
+    for budget, shown in (("small", 96), ("paper", 256)):
+        config = composed("method=ours", f"budget={budget}")
+        schedule = instantiate(config.resolution)
+        assert [schedule.resolution(step) for step in (0, 10**6)] == [shown, shown]
 
 
 def test_the_store_of_a_competitor_holds_as_many_pixels() -> None:
