@@ -3,7 +3,12 @@
 from ngi.learn.batch import Batch, Counters, Feedback
 from ngi.learn.budget import Budget
 from ngi.learn.callbacks import SamplerFeedback, callbacks
-from ngi.learn.checkpoint import AtomicCheckpointIO, prepare_resume, read_checkpoint
+from ngi.learn.checkpoint import (
+    AtomicCheckpointIO,
+    checkpoint_bytes,
+    prepare_resume,
+    read_checkpoint,
+)
 from ngi.learn.clock import PhaseClock, RunClock
 from ngi.learn.costs import Component, CostFile, Costs, components
 from ngi.learn.datamodule import ExplorationDataModule
@@ -66,6 +71,7 @@ __all__ = [
     "WarmupStableDecay",
     "WeightsAndBiases",
     "callbacks",
+    "checkpoint_bytes",
     "components",
     "gradient_norm",
     "patch_example",

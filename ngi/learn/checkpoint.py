@@ -53,9 +53,7 @@ class AtomicCheckpointIO(TorchCheckpointIO):
     ) -> None:
         """Raises OSError with what to do where the disk is full; the old checkpoints stay."""
         content = {**checkpoint, IDENTITY: self._identity}
-        buffer = serialised(content)
-        buffer.write(hashlib.sha256(buffer.getbuffer()).digest())
-        write_atomically(Path(path), buffer.getbuffer(), keep_old_as=self._previous)
+        write_atomically(Path(path), checkpoint_bytes(content), keep_old_as=self._previous)
 
 
 def prepare_resume(folder: RunFolder) -> Path | None:
@@ -128,6 +126,13 @@ def _before_decay(folder: RunFolder, newest: dict[str, Any]) -> dict[str, Any]:
     folder.previous_checkpoint.unlink(missing_ok=True)  # it may have decayed, too
     write_atomically(folder.checkpoint, path.read_bytes())
     return stable
+
+
+def checkpoint_bytes(content: dict[str, Any]) -> memoryview:
+    """Of a file that `read_checkpoint` reads."""
+    buffer = serialised(content)
+    buffer.write(hashlib.sha256(buffer.getbuffer()).digest())
+    return buffer.getbuffer()
 
 
 def read_checkpoint(path: Path) -> dict[str, Any]:

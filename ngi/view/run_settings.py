@@ -49,10 +49,14 @@ def made_by(settings: dict[str, Any], group: str) -> Callable[..., Any]:
 
 
 def make_samples(settings: dict[str, Any], renderer: Renderer) -> Samples:
-    """What was trained on; patches, where the run is older than the group `data`."""
+    """What was trained on; patches, where the run is older than the group `data`.
+
+    Parts of it that are objects, such as a denoiser, are for new samples, which nobody asks for.
+    """
     if "data" not in settings:
         return PatchSamples(renderer=renderer)
-    samples: Samples = made_by(settings, "data")(**plain(settings["data"]), renderer=renderer)
+    numbers = {k: v for k, v in plain(settings["data"]).items() if not isinstance(v, dict)}
+    samples: Samples = made_by(settings, "data")(**numbers, renderer=renderer)
     return samples
 
 

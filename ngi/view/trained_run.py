@@ -66,7 +66,7 @@ class TrainedRun:
             raise ValueError(
                 f"{folder} has no network: path tracing took its place; ngi.video shows its frames"
             )
-        checkpoint = _newest(folder)
+        checkpoint = newest_checkpoint(folder)
         description = describe_scene(settings, scene_path)
         renderer = make_renderer(folder, settings, description)
         samples = make_samples(settings, renderer)
@@ -75,7 +75,7 @@ class TrainedRun:
             layout=samples.layout,
             scene_dimensions=samples.network_dimensions,
         )
-        network.load_state_dict(_weights(checkpoint["state_dict"]))
+        network.load_state_dict(trained_weights(checkpoint["state_dict"]))
         device = "cuda" if torch.cuda.is_available() else "cpu"
         return cls(
             folder=folder,
@@ -105,7 +105,7 @@ class TrainedRun:
         return torch.expm1(self.predict(buffers, scene_vector))
 
 
-def _weights(state: dict[str, Tensor]) -> dict[str, Tensor]:
+def trained_weights(state: dict[str, Tensor]) -> dict[str, Tensor]:
     """The network's, of all that a checkpoint has."""
     prefix = AVERAGED if any(name.startswith(AVERAGED) for name in state) else NETWORK
     return {
@@ -113,7 +113,7 @@ def _weights(state: dict[str, Tensor]) -> dict[str, Tensor]:
     }
 
 
-def _newest(folder: Path) -> dict[str, Any]:
+def newest_checkpoint(folder: Path) -> dict[str, Any]:
     """Of the run's two checkpoints the newer one that is whole."""
     problems = []
     for path in (folder / name for name in CHECKPOINTS):
