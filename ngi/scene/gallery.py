@@ -1,4 +1,4 @@
-"""A contact sheet of every scene, to be looked at: `python -m ngi.scene.gallery`."""
+"""A contact sheet of every scene, to be looked at: `ngi gallery`."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def main(arguments: list[str] | None = None) -> int:
     from ngi.render.mitsuba_renderer import MitsubaRenderer
 
     parser = argparse.ArgumentParser(
-        prog="python -m ngi.scene.gallery",
+        prog="ngi gallery",
         description="Make a contact sheet of every scene: random configurations, hard frames and "
         "buffers.",
     )
