@@ -90,7 +90,7 @@ def test_a_verb_gets_its_arguments_and_gives_its_status(
     assert str(tmp_path) in capsys.readouterr().err
 
 
-def test_training_takes_the_same_words(tmp_path: Path) -> None:
+def test_training_takes_the_same_words() -> None:
     answer = ngi_command("train", "--cfg", "job", "budget=smoke", "scene=mirror")
     assert answer.returncode == 0, answer.stderr
     assert "name: mirror" in answer.stdout

@@ -61,7 +61,7 @@ def commands() -> str:
     ]
     table = "\n".join(["| command | what for | module |", "| --- | --- | --- |", *rows])
     return (
-        f"# Commands\n\n```text title=\"ngi --help\"\n{overview()}\n```\n\n"
+        f'# Commands\n\n```text title="ngi --help"\n{overview()}\n```\n\n'
         "`ngi VERB --help` says what a verb takes. There are three ways of speaking: `train` and "
         "`costs` take Hydra's `group=option` and `key=value` ([Groups and options](options.md)), "
         "`view`, `render`, `video` and `export` take `key=value`, the others take names and "
@@ -107,9 +107,7 @@ def options() -> str:
 def _option(file: Path) -> Iterator[str]:
     if comment := _comment(file):
         yield from (comment, "")
-    content = "\n".join(
-        line for line in file.read_text().splitlines() if not line.startswith("#")
-    )
+    content = "\n".join(line for line in file.read_text().splitlines() if not line.startswith("#"))
     yield from _block(content)
 
 
