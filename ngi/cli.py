@@ -32,9 +32,9 @@ WAY = {
     ),
     "Look at a run": (
         Verb("view", "ngi.view.__main__", "in the browser, with a slider for every variable"),
-        Verb("render", "ngi.view.picture", "one picture of any configuration, as PNG or EXR"),
+        Verb("render", "ngi.render.__main__", "one picture of any configuration, as PNG or EXR"),
         Verb("video", "ngi.video", "a path through the scene, and how steady the network is"),
-        Verb("export", "ngi.view.export", "the network as one ONNX file, for other programs"),
+        Verb("export", "ngi.export", "the network as one ONNX file, for other programs"),
     ),
     "Scenes": (
         Verb("describe", "ngi.scene.describe", "what varies in a scene, or could; what is wrong"),
