@@ -20,6 +20,7 @@ TITLES = {
     "constant_resolution": "exploration at constant resolution",
     "uniform_growing": "uniform sampling with growing resolution",
     "traced_specular": "traced specular bounces",
+    "traced_direct": "traced direct light",
     "sobol": "a Sobol sequence",
     "latin_hypercube": "Latin hypercubes",
     "fixed_data": "a fixed data set",

@@ -55,13 +55,14 @@ def build_module(
 
     return learn.IlluminationModule(
         network=learn.seeded(instantiate(config.model), seed=config.seed)(
-            layout=samples.layout, scene_dimensions=samples.dimensions
+            layout=samples.layout, scene_dimensions=samples.network_dimensions
         ),
         loss=instantiate(config.loss),
         optimizer=instantiate(config.optimizer),
         target=target,
         clock=clock,
         example=samples.example,
+        averaging=instantiate(config.averaging),
     )
 
 

@@ -28,9 +28,13 @@ BUFFER_CHANNELS = {
 CHAIN_CHANNELS = {"throughput": 3, "chain_roughness": 1}
 """Buffers of the specular bounces where those are traced (paper, Fig. 10)."""
 
+DIRECT_CHANNELS = {"direct": 3}
+"""Buffer of the direct light where that is traced."""
+
 _STORED = {
     **{name: count for name, count in BUFFER_CHANNELS.items() if name != "emission"},
     **CHAIN_CHANNELS,
+    **DIRECT_CHANNELS,
     "emission": BUFFER_CHANNELS["emission"],
 }
 """All of them in storage order: emission is the last."""
@@ -50,6 +54,8 @@ class BufferLayout:
     - throughput: what the specular bounces before the surface let through, linear RGB from 0 up,
       1 where there is none
     - chain_roughness: sqrt(sum of alpha^2) over these bounces
+    - direct: log1p of the direct light, the radiance that leaves the surface towards the camera
+      after one bounce from an emitter, times the throughput, linear RGB
     - emission: log1p of the emitted radiance, linear RGB
     """
 

@@ -76,6 +76,8 @@ def _train(
 ) -> dict[str, Any]:
     from ngi import learn
 
+    schedule = instantiate(config.schedule)
+    schedule.check(budget)
     clock = learn.PhaseClock(energy=EnergyMeter(energy_counters()))
     samples = build_samples(config, renderer=renderer)
     stream = build_stream(config, samples=samples, clock=clock, patches=folder.patches)
@@ -105,6 +107,7 @@ def _train(
         folder=folder,
         tracker=tracker,
         budget=budget,
+        schedule=schedule,
         recorder=recorder,
         evaluations=config.evaluation.count,
         checkpoint_seconds=config.run.checkpoint_seconds,

@@ -19,7 +19,7 @@ from ngi.resources import root, scene_folders
 CONF = root() / "conf"
 GROUPS = (
     *("sampler", "reuse", "resolution", "data", "model"),
-    *("loss", "optimizer", "budget", "tracker"),
+    *("loss", "optimizer", "schedule", "averaging", "budget", "tracker"),
 )
 OPTIONS = [(g, f.stem) for g in GROUPS for f in sorted((CONF / g).glob("*.yaml"))]
 
@@ -63,7 +63,9 @@ def test_the_defaults_are_the_papers() -> None:
     assert isinstance(network, PixelGenerator)
     assert len(network.hidden) + 1 == 8
     assert config.model.hidden_features == 512
-    assert config.optimizer.lr == 1e-4
+    assert config.optimizer == {"_target_": "torch.optim.Adam", "_partial_": True, "lr": 1e-4}
+    assert instantiate(config.schedule).factor(steps=0, used=0.99) == 1
+    assert instantiate(config.averaging)(network) is None
     assert config.reuse.policy.beta == 4.6
     assert config.reuse.policy.bootstrap_batches == 100
     assert config.sampler.proposal.large_step_probability == 0.3
@@ -77,25 +79,39 @@ def test_the_defaults_are_the_papers() -> None:
     ]
 
 
+@pytest.mark.parametrize(
+    ("size", "rate"),
+    [("budget=small", 1e-3), ("experiment=exploration_map", 2e-3), ("budget=smoke", 1e-4)],
+)
+def test_a_size_has_adams_rate_and_leaves_others_alone(size: str, rate: float) -> None:
+    assert composed(size).optimizer.lr == rate
+    assert composed(size).optimizer.keys() == {"_target_", "_partial_", "lr"}
+    assert composed(size, "optimizer=muon").optimizer == composed("optimizer=muon").optimizer
+
+
 PRECONDITIONED, PLAIN = "pixel_generator", "pixel_generator_no_preconditioning"
 COMPETITORS = ("cnsr", "anf")
 """Other methods, whose samples are of another size."""
-METHODS = {  # sampler, resolution, model, specular
-    "active_exploration": ("mcmc_loss_step", "growing", PRECONDITIONED, "learned"),
-    "uniform": ("uniform", "constant", PRECONDITIONED, "learned"),
-    "uniform_growing": ("uniform", "growing", PRECONDITIONED, "learned"),
-    "sobol": ("sobol", "constant", PRECONDITIONED, "learned"),
-    "latin_hypercube": ("latin_hypercube", "constant", PRECONDITIONED, "learned"),
-    "fixed_data": ("uniform", "constant", PRECONDITIONED, "learned"),
-    "prioritised_replay": ("uniform", "constant", PRECONDITIONED, "learned"),
-    "constant_resolution": ("mcmc_loss_step", "constant", PRECONDITIONED, "learned"),
-    "loss_target": ("mcmc_loss", "growing", PRECONDITIONED, "learned"),
-    "output_gradient_target": ("mcmc_output_gradient", "growing", PRECONDITIONED, "learned"),
-    "metropolis": ("mcmc_metropolis", "growing", PRECONDITIONED, "learned"),
-    "no_preconditioning": ("mcmc_loss_step", "growing", PLAIN, "learned"),
-    "cnsr": ("uniform", "constant", "cnsr", "learned"),
-    "anf": ("uniform", "constant", "anf", "learned"),
-    "traced_specular": ("mcmc_loss_step", "growing", PRECONDITIONED, "traced"),
+OURS = ("ours", "ours_uniform")
+METHODS = {  # sampler, resolution, model, what the renderer traces into the buffers
+    "active_exploration": ("mcmc_loss_step", "growing", PRECONDITIONED, []),
+    "uniform": ("uniform", "constant", PRECONDITIONED, []),
+    "uniform_growing": ("uniform", "growing", PRECONDITIONED, []),
+    "sobol": ("sobol", "constant", PRECONDITIONED, []),
+    "latin_hypercube": ("latin_hypercube", "constant", PRECONDITIONED, []),
+    "fixed_data": ("uniform", "constant", PRECONDITIONED, []),
+    "prioritised_replay": ("uniform", "constant", PRECONDITIONED, []),
+    "constant_resolution": ("mcmc_loss_step", "constant", PRECONDITIONED, []),
+    "loss_target": ("mcmc_loss", "growing", PRECONDITIONED, []),
+    "output_gradient_target": ("mcmc_output_gradient", "growing", PRECONDITIONED, []),
+    "metropolis": ("mcmc_metropolis", "growing", PRECONDITIONED, []),
+    "no_preconditioning": ("mcmc_loss_step", "growing", PLAIN, []),
+    "cnsr": ("uniform", "constant", "cnsr", []),
+    "anf": ("uniform", "constant", "anf", []),
+    "traced_specular": ("mcmc_loss_step", "growing", PRECONDITIONED, ["specular"]),
+    "ours": ("sobol", "constant", "encoded_generator", ["direct"]),
+    "ours_uniform": ("uniform", "constant", "encoded_generator", ["direct"]),
+    "traced_direct": ("mcmc_loss_step", "growing", PRECONDITIONED, ["direct"]),
 }
 PRIORITISED = {"_target_": "ngi.reuse.Prioritised", "alpha": 0.6, "beta": 0.4, "epsilon": 1e-6}
 
@@ -128,7 +144,8 @@ def test_path_tracing_takes_the_place_of_training_and_changes_nothing_else(metho
 def test_a_method_differs_where_its_name_says_and_nowhere_else(method: str) -> None:
     config = composed(f"method={method}", "budget=small")
     chosen = config.hydra.runtime.choices
-    found = (chosen.sampler, chosen.resolution, chosen.model, config.renderer.specular)
+    traced = [name for name in ("specular", "direct") if config.renderer[name] == "traced"]
+    found = (chosen.sampler, chosen.resolution, chosen.model, traced)
     assert found == METHODS[method]
     assert config.label.method == method
     other = composed("budget=small")
@@ -137,10 +154,32 @@ def test_a_method_differs_where_its_name_says_and_nowhere_else(method: str) -> N
     if method == "prioritised_replay":
         with open_dict(other):
             other.reuse.store.rule = PRIORITISED
-    parts = ("scene", "optimizer", "budget", "evaluation", "trainer")
+    parts = ("scene", "budget", "evaluation", "trainer")
     own = () if method in COMPETITORS else ("data", "reuse", "loss")
+    own = ("loss",) if method in OURS else ("optimizer", "schedule", "averaging", *own)
     for part in (*parts, *own):
         assert config[part] == other[part], part
+
+
+@pytest.mark.parametrize("method", OURS)
+def test_ours_differs_in_every_part_that_can_be_taken_out_again(method: str) -> None:
+    chosen = composed(f"method={method}", "budget=small").hydra.runtime.choices
+    parts = ("optimizer", "schedule", "averaging", "data", "reuse")
+    options = {part: chosen[part] for part in parts}
+    assert options == {
+        "optimizer": "muon",
+        "schedule": "warmup_stable_decay",
+        "averaging": "exponential",
+        "data": "denoised_patches",
+        "reuse": "steady",
+    }
+
+
+def test_ours_trains_on_images_as_large_as_those_that_are_shown() -> None:
+    for budget, shown in (("small", 96), ("paper", 256)):
+        config = composed("method=ours", f"budget={budget}")
+        schedule = instantiate(config.resolution)
+        assert [schedule.resolution(step) for step in (0, 10**6)] == [shown, shown]
 
 
 def test_the_store_of_a_competitor_holds_as_many_pixels() -> None:

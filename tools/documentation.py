@@ -28,6 +28,8 @@ GROUPS = {
     "model": "The network.",
     "loss": "Between the network's log1p radiance and the path tracer's.",
     "optimizer": "Of the network's weights.",
+    "schedule": "Of the learning rate, over the run.",
+    "averaging": "Of the weights that are evaluated and shown.",
     "budget": "The size of a run, and how long it takes.",
     "evaluation": "Test frames, references and metrics.",
     "renderer": "What traces the patches.",

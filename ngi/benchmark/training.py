@@ -9,7 +9,7 @@ import torch
 from ngi.benchmark import PATCH_SIZE, PATCHES
 from ngi.benchmark.figures import Figure, figure, in_turn, ratio
 from ngi.explore import LossTimesOutputGradient, LossTimesStep, Target
-from ngi.learn import PatchSamples, PhaseClock, Scorer
+from ngi.learn import PhaseClock, Scorer, patch_example
 from ngi.models import L1Dssim, PatchLinear, PixelGenerator
 from ngi.patches import BufferLayout, Patches
 
@@ -65,7 +65,7 @@ class Training:
             network=self.network,
             loss=self.loss,
             clock=PhaseClock(),
-            example=PatchSamples.example,
+            example=patch_example,
         )
 
         def scored_step() -> None:

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from typing import Protocol
 
+import torch
 from torch import Tensor
+
+from ngi.patches import BufferLayout
 
 
 class Denoiser(Protocol):
@@ -31,7 +34,8 @@ class OpenImageDenoise:
             import pyoidn
         except ModuleNotFoundError as error:
             raise RuntimeError(
-                f"path_tracing=oidn needs {error.name}: pip install -e .[denoise]"
+                f"Open Image Denoise is asked for, and needs {error.name}: "
+                "pip install -e .[denoise]"
             ) from error
         self._denoise = pyoidn.denoise
 
@@ -66,3 +70,19 @@ class OptixDenoise:
         denoised = self._denoiser(mi.TensorXf(radiance.numpy()), mi.TensorXf(albedo.numpy()))
         result: Tensor = denoised.torch().cpu()
         return result
+
+
+def guides(buffers: Tensor, layout: BufferLayout) -> tuple[Tensor, Tensor]:
+    """Albedo and world-space normal, [H, W, 3] each, as denoisers take them.
+
+    A buffer that the scene does not carry is constant: an albedo of 1, a normal of 0.
+    """
+    albedo = torch.ones(*buffers.shape[:2], 3)
+    normal = torch.zeros_like(albedo)
+    if "albedo" in layout.names:
+        albedo = buffers[..., layout.slice("albedo")].clamp(0, 1)
+    if "normal" in layout.names:
+        stored = buffers[..., layout.slice("normal")]
+        hit = (stored != 0).any(dim=-1, keepdim=True)
+        normal = torch.where(hit, 2 * stored - 1, 0)
+    return albedo.contiguous(), normal.contiguous()

@@ -8,8 +8,7 @@ from itertools import count
 import torch
 from torch import Tensor
 
-from ngi.denoise.denoisers import Denoiser
-from ngi.patches import BufferLayout
+from ngi.denoise.denoisers import Denoiser, guides
 from ngi.render.protocol import Renderer
 from ngi.render.tracing import derive_seed
 
@@ -92,19 +91,3 @@ class PathTracing:
     def predict(self, buffers: Tensor, radiance: Tensor) -> Tensor:
         """log1p of a frame, denoised."""
         return torch.log1p(self.denoise(radiance, buffers))
-
-
-def guides(buffers: Tensor, layout: BufferLayout) -> tuple[Tensor, Tensor]:
-    """Albedo and world-space normal, [H, W, 3] each, as denoisers take them.
-
-    A buffer that the scene does not carry is constant: an albedo of 1, a normal of 0.
-    """
-    albedo = torch.ones(*buffers.shape[:2], 3)
-    normal = torch.zeros_like(albedo)
-    if "albedo" in layout.names:
-        albedo = buffers[..., layout.slice("albedo")].clamp(0, 1)
-    if "normal" in layout.names:
-        stored = buffers[..., layout.slice("normal")]
-        hit = (stored != 0).any(dim=-1, keepdim=True)
-        normal = torch.where(hit, 2 * stored - 1, 0)
-    return albedo.contiguous(), normal.contiguous()

@@ -20,7 +20,7 @@ class Signals:
     loss: [n], the training loss of the sample
     output_gradient_norm: [n], L2 norm of the loss's derivative by the network's output, over the
         pixels of the patch; it falls out of the training pass
-    step_norm: [n], L2 norm over all weights of the Adam step this sample alone would cause,
+    step_norm: [n], L2 norm over all weights of the optimiser's step this sample alone would cause,
         momentum and RMS included
     """
 
@@ -53,7 +53,7 @@ class Loss:
 
 
 class LossTimesStep:
-    """Loss times the norm of the total Adam step of this sample (paper, Sec. 5.1)."""
+    """Loss times the norm of the optimiser's total step for this sample (paper, Sec. 5.1)."""
 
     requires = frozenset({"loss", "step_norm"})
 

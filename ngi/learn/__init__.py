@@ -8,6 +8,7 @@ from ngi.learn.clock import PhaseClock, RunClock
 from ngi.learn.costs import Component, CostFile, Costs, components
 from ngi.learn.datamodule import ExplorationDataModule
 from ngi.learn.interruption import Interrupted, Interruption
+from ngi.learn.learning_rate import LearningRate
 from ngi.learn.model_clock import ModelClock
 from ngi.learn.module import IlluminationModule, seeded
 from ngi.learn.observation_sets import ObservationSets
@@ -15,7 +16,8 @@ from ngi.learn.record_log import RecordLog
 from ngi.learn.recorder import Recorder
 from ngi.learn.row_log import RowLog
 from ngi.learn.run_folder import RunFolder
-from ngi.learn.samples import Example, PatchSamples, Samples
+from ngi.learn.samples import Example, PatchSamples, Samples, patch_example
+from ngi.learn.schedule import ConstantRate, Schedule, WarmupStableDecay
 from ngi.learn.scorer import Scorer
 from ngi.learn.sequences import Sequences
 from ngi.learn.step_guard import LARGEST_NORM, StepGuard, gradient_norm
@@ -30,6 +32,7 @@ __all__ = [
     "Batch",
     "Budget",
     "Component",
+    "ConstantRate",
     "CostFile",
     "Costs",
     "Counters",
@@ -39,6 +42,7 @@ __all__ = [
     "IlluminationModule",
     "Interrupted",
     "Interruption",
+    "LearningRate",
     "Local",
     "ModelClock",
     "ObservationSets",
@@ -52,16 +56,19 @@ __all__ = [
     "RunFolder",
     "SamplerFeedback",
     "Samples",
+    "Schedule",
     "Scorer",
     "Sequences",
     "StepGuard",
     "TargetMap",
     "Tracker",
     "TrainingStream",
+    "WarmupStableDecay",
     "WeightsAndBiases",
     "callbacks",
     "components",
     "gradient_norm",
+    "patch_example",
     "prepare_resume",
     "read_checkpoint",
     "seeded",

@@ -12,10 +12,12 @@ from typing import Any
 from ngi.learn.budget import Budget
 from ngi.learn.clock import PhaseClock, RunClock
 from ngi.learn.interruption import Interruption
+from ngi.learn.learning_rate import LearningRate
 from ngi.learn.lightning_api import Callback, LightningModule, Trainer
 from ngi.learn.recorder import Recorder
 from ngi.learn.run_folder import RunFolder
 from ngi.learn.saving import BudgetAndCheckpoint, budget_used
+from ngi.learn.schedule import Schedule
 from ngi.learn.step_guard import StepGuard
 from ngi.learn.stream import TrainingStream
 from ngi.learn.tracker import Tracker
@@ -101,6 +103,8 @@ class PeriodicEvaluation(Callback):
         self._done = 0
 
     def on_train_start(self, *_: Any) -> None:
+        # A run that is trained longer has been evaluated more often by now than it would have been.
+        self._done = min(self._done, self._due)
         self._evaluate_if_due()  # a signal came at this very step, before it was evaluated
 
     def on_train_batch_end(self, *_: Any) -> None:
@@ -113,12 +117,17 @@ class PeriodicEvaluation(Callback):
         self._done = state_dict["done"]
 
     def _evaluate_if_due(self) -> None:
-        used = budget_used(self._budget, self._stream, self._run_clock)
-        due = int(used * self._count)
-        if used < 1 and due > self._done:
+        due = self._due
+        if self._done < due < self._count:
             self._stream.finish_rendering()
             self._recorder.evaluate()
             self._done = due
+
+    @property
+    def _due(self) -> int:
+        """Evaluations by now; the last of them once the budget is used up."""
+        used = budget_used(self._budget, self._stream, self._run_clock)
+        return int(used * self._count)
 
 
 def callbacks(
@@ -129,6 +138,7 @@ def callbacks(
     folder: RunFolder,
     tracker: Tracker,
     budget: Budget,
+    schedule: Schedule,
     recorder: Recorder,
     evaluations: int,
     checkpoint_seconds: float,
@@ -150,11 +160,13 @@ def callbacks(
             tracker=tracker,
             guard=guard,
         ),
+        LearningRate(schedule=schedule, budget=budget, stream=stream, run_clock=run_clock),
         PeriodicEvaluation(
             recorder=recorder, count=evaluations, budget=budget, stream=stream, run_clock=run_clock
         ),
         BudgetAndCheckpoint(
             budget=budget,
+            schedule=schedule,
             stream=stream,
             clock=clock,
             run_clock=run_clock,

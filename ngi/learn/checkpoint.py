@@ -22,6 +22,13 @@ log = logging.getLogger(__name__)
 IDENTITY = "run_identity"
 """Key under which a checkpoint names the run it belongs to."""
 
+STREAM = ExplorationDataModule.__qualname__
+"""Key of the stream's state."""
+
+DECAYS_FROM = "decays_from"
+"""Key, in the state of `BudgetAndCheckpoint`, of the step after which the learning rate's decay
+began; None before."""
+
 CHECKSUM_BYTES = hashlib.sha256().digest_size
 """A checkpoint file ends with the SHA-256 of what comes before; torch.load does not mind."""
 
@@ -55,10 +62,13 @@ def prepare_resume(folder: RunFolder) -> Path | None:
     """The checkpoint to go on from, or None for a fresh start; cuts the logs back to it.
 
     Where the newest one, or a patch that it needs, is damaged, it is replaced by the one before it.
-    Raises ValueError where both are damaged, and where one belongs to another run; the folder is
-    left as it was then.
+    A run that is trained longer goes on from the last one before its learning rate decayed.
+    Raises ValueError where both are damaged, where one belongs to another run, and where a run can
+    not be trained longer; the folder is left as it was then.
     """
     checkpoint = _newest_usable(folder)
+    if folder.lengthened and checkpoint is not None:
+        checkpoint = _before_decay(folder, checkpoint)
     step = 0 if checkpoint is None else checkpoint["global_step"]
     dropped = {log_file: log_file.keep_until(step) for log_file in folder.logs}
     if checkpoint is None:
@@ -95,6 +105,31 @@ def _newest_usable(folder: RunFolder) -> dict[str, Any] | None:
     return None
 
 
+def _before_decay(folder: RunFolder, newest: dict[str, Any]) -> dict[str, Any]:
+    """What `folder.checkpoint` holds once a longer run can go on from it."""
+    step = newest["callbacks"]["BudgetAndCheckpoint"][DECAYS_FROM]
+    log.info("%s is trained longer; what it had as its result is made again", folder.path)
+    if step is None or step == newest["global_step"]:
+        return newest
+    remedy = "choose another folder with run.folder=… for the longer run"
+    if step == 0:
+        raise ValueError(
+            f"{folder.path} can not be trained longer: its learning rate decays from the first "
+            f"step on (schedule.decay_share: 1), so that no step is that of a longer run; {remedy}"
+        )
+    path = folder.stable_checkpoint
+    try:
+        stable = _read(path, folder)
+    except (OSError, DamagedError) as error:
+        raise ValueError(
+            f"{folder.path} can not be trained longer: its learning rate has decayed since step "
+            f"{step}, and the checkpoint of that step can not be used ({error}); {remedy}"
+        ) from error
+    folder.previous_checkpoint.unlink(missing_ok=True)  # it may have decayed, too
+    write_atomically(folder.checkpoint, path.read_bytes())
+    return stable
+
+
 def read_checkpoint(path: Path) -> dict[str, Any]:
     """A checkpoint file's content, on the CPU; executes no code of it.
 
@@ -121,5 +156,5 @@ def _read(path: Path, folder: RunFolder) -> dict[str, Any]:
             "scene or configuration); choose another folder with run.folder=…, or delete the "
             "checkpoint"
         )
-    PatchArchive(folder.patches).check(checkpoint[ExplorationDataModule.__qualname__]["store"])
+    PatchArchive(folder.patches).check(checkpoint[STREAM]["store"])
     return checkpoint

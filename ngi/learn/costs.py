@@ -36,6 +36,9 @@ from ngi.render.protocol import Renderer
 Costs = dict[str, dict[str, float]]
 """Component -> phase -> seconds per step that the component belongs to."""
 
+NOT_AVERAGED = "ngi.models.no_average"
+"""What conf/averaging/none.yaml names."""
+
 REMEDY = "measure it by the same command line with `python -m ngi.costs` for `python -m ngi.train`"
 
 
@@ -73,7 +76,8 @@ def components(settings: Mapping[str, Any], *, renderer: Renderer, scored: bool)
     }
     training = {
         **{part: settings[part] for part in ("model", "loss", "trainer")},
-        "optimizer": _without(settings["optimizer"], "lr"),
+        "optimizer": _without(settings["optimizer"], "lr", "adam_lr"),
+        **_averaging(settings),
         **patches,
     }
     rendering = {
@@ -92,6 +96,12 @@ def components(settings: Mapping[str, Any], *, renderer: Renderer, scored: bool)
     if scored:
         found.append(Component("scoring", {"target": sampler["target"], **training}))
     return found
+
+
+def _averaging(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Nothing without an average: what is measured already stays what it is called."""
+    averaging = _without(settings["averaging"], "decay")
+    return {} if averaging["_target_"] == NOT_AVERAGED else {"averaging": averaging}
 
 
 def _gpu() -> dict[str, str]:

@@ -15,7 +15,7 @@ from ngi.learn.clock import PhaseClock
 from ngi.learn.lightning_api import LightningModule
 from ngi.learn.samples import Example
 from ngi.learn.scorer import Scorer
-from ngi.models import SampleLoss
+from ngi.models import Averaging, SampleLoss, no_average
 from ngi.patches import Patches
 
 T = TypeVar("T")
@@ -30,6 +30,7 @@ class IlluminationModule(LightningModule):
         log1p radiance [n, H, W, 3]
     loss: (prediction, target) -> loss per sample [n]
     optimizer: makes the optimiser from the parameters
+    averaging: makes the average of the network's weights that `predict` uses in their place
     target: the target density that the chains explore
     example: see `ngi.learn.Samples.example`
     """
@@ -43,9 +44,11 @@ class IlluminationModule(LightningModule):
         target: Target,
         clock: PhaseClock,
         example: Callable[[Patches], Example],
+        averaging: Averaging = no_average,
     ) -> None:
         super().__init__()
         self.network = network
+        self.averaged = averaging(network)
         self.loss = loss
         self._make_optimizer = optimizer
         self._clock = clock
@@ -79,6 +82,12 @@ class IlluminationModule(LightningModule):
         weighted = losses if batch.loss_weights is None else losses * batch.loss_weights
         return {"loss": weighted.mean(), "feedback": feedback}
 
+    def optimizer_step(self, *arguments: Any, **options: Any) -> None:
+        """Lightning's, and the average follows: within the time that counts as training."""
+        super().optimizer_step(*arguments, **options)
+        if self.averaged is not None:
+            self.averaged.update_parameters(self.network)
+
     def _losses(self, patches: Patches) -> tuple[Tensor, Tensor]:
         inputs, target = self._example(patches)
         prediction = self.network(*inputs)
@@ -87,15 +96,16 @@ class IlluminationModule(LightningModule):
     def predict(self, buffers: Tensor, *inputs: Tensor) -> Tensor:
         """One image: buffers [H, W, C] and `Samples.test_inputs` to log1p radiance [H, W, 3].
 
-        On the CPU, wherever the network is.
+        By the averaged weights where there are such. On the CPU, wherever the network is.
         """
+        network = self.network if self.averaged is None else self.averaged.module
         on_device = (tensor.to(self.device) for tensor in (buffers, *inputs))
         with torch.no_grad(), self.trainer.precision_plugin.forward_context():
-            output = self.network.render(*on_device)  # type: ignore[operator]
+            output = network.render(*on_device)  # type: ignore[operator]
         return output.float().cpu()
 
     def signals(self, patches: Patches, target: Target) -> Signals:
-        """What `target` requires of [n] patches under the present weights and Adam's moments.
+        """What `target` requires of [n] patches under the present weights and moments.
 
         In the precision of training; nothing that training depends on changes.
         """

@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import hashlib
 import json
+import math
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, TextIO
@@ -18,8 +19,11 @@ from ngi.learn.row_log import RowLog
 class RunFolder:
     """The folder of one run. A run's identity is the hash of what decides its result.
 
+    How long it trains is no part of it: a run can be trained longer, in its folder.
+
     settings: everything that decides the result (resolved configuration, scene hash, version),
         as plain JSON data.
+    lengthened: whether the folder holds the same run with a smaller budget
     Raises ValueError where the folder holds another run, RuntimeError where another process is
     training in it, OSError where it can not be written to. Nothing in the folder is touched before
     that is known.
@@ -28,10 +32,11 @@ class RunFolder:
     def __init__(self, path: Path, *, settings: dict[str, Any]) -> None:
         self.path = path
         self.settings = settings
-        canonical = json.dumps(settings, sort_keys=True)
+        canonical = json.dumps(_without_limits(settings)[0], sort_keys=True)
         self.identity = hashlib.sha256(canonical.encode()).hexdigest()[:16]
         self.checkpoint = path / "last.ckpt"
         self.previous_checkpoint = path / "previous.ckpt"
+        self.stable_checkpoint = path / "stable.ckpt"  # the last before the learning rate decayed
         self.patches = path / "patches"
         self.pictures = path / "pictures"
         self.metrics = RowLog(path / "metrics.csv")
@@ -41,13 +46,14 @@ class RunFolder:
         self.logs = (self.steps, self.metrics, self.chains, self.target_maps)
         self._result = path / "result.json"
         self._settings = path / "settings.json"
+        self.lengthened = False
         self._lock = self._acquire_lock()
         self._check_identity()
 
     @property
     def result(self) -> dict[str, Any] | None:
         """The finished run's result, or None while the run is not finished."""
-        if not self._result.exists():
+        if self.lengthened or not self._result.exists():
             return None
         try:
             return json.loads(self._result.read_text())
@@ -59,6 +65,8 @@ class RunFolder:
 
     def begin(self) -> None:
         """Makes the folder this run's, once everything is built and training can start."""
+        if self.lengthened:
+            self._result.unlink(missing_ok=True)  # of the shorter run
         _write_json(self._settings, self.settings)
 
     def write_result(self, result: dict[str, Any]) -> None:
@@ -96,14 +104,17 @@ class RunFolder:
         if not (self._settings.exists() and any(file.exists() for file in to_lose)):
             return
         try:
-            earlier = _flatten(json.loads(self._settings.read_text()))
+            earlier = json.loads(self._settings.read_text())
         except ValueError as error:
             self._lock.close()
             raise ValueError(
                 f"{self._settings} is damaged ({error}); delete it if you are sure that this "
                 "folder holds the same run"
             ) from error
-        now = _flatten(self.settings)
+        if isinstance(earlier, dict) and _longer(self.settings, than=earlier):
+            self.lengthened = True
+            return
+        earlier, now = _flatten(earlier), _flatten(self.settings)
         different = [
             f"{key}: {earlier.get(key, 'absent')!r} there, {now.get(key, 'absent')!r} now"
             for key in sorted(earlier.keys() | now.keys())
@@ -116,6 +127,22 @@ class RunFolder:
                 f"{'; …' if len(different) > 3 else ''}); choose another folder with run.folder=…, "
                 "or delete that one"
             )
+
+
+def _longer(settings: dict[str, Any], *, than: dict[str, Any]) -> bool:
+    """Whether these are settings of the same run with a larger budget, and it trains."""
+    (now, limits), (earlier, former) = map(_without_limits, (settings, than))
+    if now != earlier or "path_tracing" in now or limits == former:
+        return False
+    return all(limit >= old for limit, old in zip(limits, former, strict=True))
+
+
+def _without_limits(settings: dict[str, Any]) -> tuple[dict[str, Any], list[float]]:
+    """The settings but for how long the run is, and this: steps and seconds, Inf for no limit."""
+    budget = dict(settings.get("budget", {}))
+    limits = [budget.pop(unit, None) for unit in ("steps", "seconds")]
+    rest = {**settings, "budget": budget} if "budget" in settings else settings
+    return rest, [math.inf if limit is None else limit for limit in limits]
 
 
 def _write_json(path: Path, content: dict[str, Any]) -> None:

@@ -7,6 +7,8 @@ from typing import Protocol
 import torch
 from torch import Tensor
 
+from ngi.denoise.denoised_job import DenoisedJob
+from ngi.denoise.denoisers import Denoiser
 from ngi.patches import BufferLayout, Patches
 from ngi.render.protocol import PatchJob, Renderer
 
@@ -25,6 +27,8 @@ class Samples(Protocol):
     """Of the buffers."""
     dimensions: int
     """Of a sample's state, which stands where v does; the patch position is not counted."""
+    network_dimensions: int
+    """Of the vector that the network is given in v's place."""
     patch_size: int
 
     def check_resolution(self, resolution: int) -> None:
@@ -59,13 +63,33 @@ class PatchSamples:
     """The paper's `Samples`: one patch each, from whose buffers and v the network tells radiance.
 
     renderer: of the scene
+    camera: whether the network is given the components of v that place the camera, as in the
+        paper. The radiance that leaves a point in a direction does not depend on them, and the
+        buffers say where the point is and which direction
+    denoiser: takes the noise off newly traced radiance, or None
+    traced_share: see `DenoisedJob`
+    Raises ValueError for a share that is none.
     """
 
-    def __init__(self, *, renderer: Renderer) -> None:
+    def __init__(
+        self,
+        *,
+        renderer: Renderer,
+        camera: bool = True,
+        denoiser: Denoiser | None = None,
+        traced_share: float = 0.5,
+    ) -> None:
+        if not 0 <= traced_share <= 1:
+            raise ValueError(f"data.traced_share is {traced_share}; expected 0 to 1")
+        self._renderer = renderer
+        self._denoiser = denoiser
+        self._traced_share = traced_share
         self.layout = renderer.layout
         self.dimensions = renderer.dimensions
         self.patch_size = renderer.patch_size
-        self.start_patches = renderer.start_patches
+        left_out = slice(0, 0) if camera else renderer.camera_part
+        self._seen = [i for i in range(self.dimensions) if i not in _indices(left_out)]
+        self.network_dimensions = len(self._seen)
 
     def check_resolution(self, resolution: int) -> None:
         """See `Samples.check_resolution`."""
@@ -74,6 +98,13 @@ class PatchSamples:
                 f"resolution: the image has {resolution} pixels a side, less than a "
                 f"patch of {self.patch_size}; raise resolution or lower renderer.patch_size"
             )
+
+    def start_patches(self, states: Tensor, *, resolution: int, seed: int) -> PatchJob:
+        """See `Samples.start_patches`."""
+        job = self._renderer.start_patches(states, resolution=resolution, seed=seed)
+        if self._denoiser is None:
+            return job
+        return DenoisedJob(job, self._denoiser, traced_share=self._traced_share, layout=self.layout)
 
     def blank(self, count: int) -> Patches:
         """See `Samples.blank`."""
@@ -85,12 +116,25 @@ class PatchSamples:
         """See `Samples.rearranged`: a patch is what it is."""
         return patches
 
-    @staticmethod
-    def example(patches: Patches) -> Example:
-        """See `Samples.example`: buffers [n, P, P, C] and v [n, D]."""
-        return (patches.buffers, patches.scene_vector), patches.log_radiance
+    def example(self, patches: Patches) -> Example:
+        """See `Samples.example`: buffers [n, P, P, C] and v [n, D], or what is seen of it."""
+        (buffers, scene_vectors), log_radiance = patch_example(patches)
+        return (buffers, self._of(scene_vectors)), log_radiance
 
-    @staticmethod
-    def test_inputs(scene_vector: Tensor, *, resolution: int) -> tuple[Tensor, ...]:  # noqa: ARG004
-        """See `Samples.test_inputs`: v itself."""
-        return (scene_vector,)
+    def test_inputs(self, scene_vector: Tensor, *, resolution: int) -> tuple[Tensor, ...]:  # noqa: ARG002
+        """See `Samples.test_inputs`: v [D], or what is seen of it."""
+        return (self._of(scene_vector),)
+
+    def _of(self, scene_vectors: Tensor) -> Tensor:
+        if self.network_dimensions == self.dimensions:
+            return scene_vectors
+        return scene_vectors[..., self._seen]
+
+
+def patch_example(patches: Patches) -> Example:
+    """All that the paper's network is given of patches: buffers [n, P, P, C] and v [n, D]."""
+    return (patches.buffers, patches.scene_vector), patches.log_radiance
+
+
+def _indices(part: slice) -> range:
+    return range(part.start, part.stop)

@@ -8,11 +8,14 @@ from typing import Any
 
 from tqdm import tqdm
 
+from ngi.durable import DamagedError, write_atomically
 from ngi.learn.budget import Budget
+from ngi.learn.checkpoint import DECAYS_FROM, STREAM, read_checkpoint
 from ngi.learn.clock import PhaseClock, RunClock
 from ngi.learn.interruption import Interruption
 from ngi.learn.lightning_api import Callback, LightningModule, Trainer
 from ngi.learn.run_folder import RunFolder
+from ngi.learn.schedule import Schedule
 from ngi.learn.stream import TrainingStream
 
 log = logging.getLogger(__name__)
@@ -26,6 +29,10 @@ def budget_used(budget: Budget, stream: TrainingStream, clock: RunClock) -> floa
 class BudgetAndCheckpoint(Callback):
     """Shows progress, saves a checkpoint every so often, and ends the run when the budget is spent.
 
+    Once the learning rate's schedule depends on how long the run is to be, the checkpoint of that
+    step is kept too: a longer run goes on from it. The first step may be such a one; then there is
+    none.
+
     every_seconds: run time between checkpoints, by the wall clock
     every_steps: further checkpoints after so many steps; None for none
     interruption: a signal that was deferred by it ends the run after this step, with a checkpoint
@@ -35,6 +42,7 @@ class BudgetAndCheckpoint(Callback):
         self,
         *,
         budget: Budget,
+        schedule: Schedule,
         stream: TrainingStream,
         clock: PhaseClock,
         run_clock: RunClock,
@@ -44,6 +52,7 @@ class BudgetAndCheckpoint(Callback):
         interruption: Interruption,
     ) -> None:
         self._budget = budget
+        self._schedule = schedule
         self._stream = stream
         self._clock = clock
         self._run_clock = run_clock
@@ -53,6 +62,7 @@ class BudgetAndCheckpoint(Callback):
         self._interruption = interruption
         self._saved_at = 0.0
         self._saved_step = 0
+        self._decays_from: int | None = None  # the step after which the schedule's decay began
         self._bar: tqdm[Any] | None = None
 
     def on_train_start(self, trainer: Trainer, *_: Any) -> None:
@@ -60,6 +70,7 @@ class BudgetAndCheckpoint(Callback):
         trainer.should_stop = used >= 1  # killed after its last step, before its result
         self._saved_at = self._clock.run_seconds
         self._saved_step = self._stream.counters.iteration
+        self._go_on_decaying(used)
         self._bar = tqdm(
             total=100,
             initial=100 * min(used, 1.0),
@@ -75,10 +86,16 @@ class BudgetAndCheckpoint(Callback):
         used = budget_used(self._budget, self._stream, self._run_clock)
         self._show(min(used, 1.0), float(outputs["loss"]))
         periodic = self._every_steps is not None and steps % self._every_steps == 0
-        if used >= 1 or periodic or seconds - self._saved_at >= self._every_seconds:
+        decay_begins = self._decays_from is None and self._schedule.decays(used)
+        if decay_begins:
+            self._decays_from = steps
+        due = periodic or seconds - self._saved_at >= self._every_seconds
+        if used >= 1 or decay_begins or due:
             if used < 1:  # nobody waits for patches that no step follows
                 self._stream.finish_rendering()
             self._save(trainer)
+        if decay_begins:
+            self._keep_stable()
         trainer.should_stop = used >= 1
         self._interruption.check()
 
@@ -105,6 +122,34 @@ class BudgetAndCheckpoint(Callback):
             self._stream.prune_archive()
         self._saved_at = self._clock.run_seconds
         self._saved_step = self._stream.counters.iteration
+
+    def state_dict(self) -> dict[str, Any]:
+        return {DECAYS_FROM: self._decays_from}
+
+    def load_state_dict(self, state_dict: dict[str, Any]) -> None:
+        self._decays_from = state_dict[DECAYS_FROM]
+
+    def _go_on_decaying(self, used: float) -> None:
+        """What a resumed run has to know of the checkpoint before its decay."""
+        step, stable = self._stream.counters.iteration, self._folder.stable_checkpoint
+        if not self._schedule.decays(used):
+            self._decays_from = None  # it is trained longer
+        elif step == 0:
+            self._decays_from = 0
+        elif self._decays_from in (None, step):  # perhaps killed before it could be kept
+            self._decays_from = step
+            self._keep_stable()
+        elif stable.exists():
+            try:
+                self._stream.keep(read_checkpoint(stable)[STREAM])
+            except DamagedError as error:
+                log.warning("%s; this run can not be trained longer later on", error)
+
+    def _keep_stable(self) -> None:
+        with self._clock.phase("checkpoint"):
+            content = self._folder.checkpoint.read_bytes()
+            write_atomically(self._folder.stable_checkpoint, content)
+        self._stream.keep()
 
     def _show(self, used: float, loss: float) -> None:
         assert self._bar is not None

@@ -2,7 +2,7 @@
 
 Scoring has to cost next to nothing (a sampler that spends a third of its time on it loses to
 uniform sampling at equal time). The proposals are trained on anyway, so that their loss, their
-gradient at the output and the norm of their Adam step are taken from the training pass itself.
+gradient at the output and the norm of their step are taken from the training pass itself.
 Only the chains' current states go through the network for it, all in one pass.
 """
 
@@ -20,8 +20,8 @@ from ngi.learn.clock import PhaseClock
 from ngi.learn.samples import Example
 from ngi.models import (
     SampleLoss,
-    adam_step_norm,
     output_gradient_norm,
+    sample_step_norm,
     step_norms_in_backward,
 )
 from ngi.patches import Patches
@@ -99,7 +99,7 @@ class Scorer:
         losses = norms = gradients = None
         inputs, target = self._example(patches)
         if "step_norm" in self._target.requires:
-            losses, norms = adam_step_norm(self._network, self._loss, optimizer, inputs, target)
+            losses, norms = sample_step_norm(self._network, self._loss, optimizer, inputs, target)
         if losses is None or "output_gradient_norm" in self._target.requires:
             with torch.no_grad():
                 output = self._network(*inputs)

@@ -3,7 +3,8 @@
 A gradient that holds NaN or Inf would take the weights with it, and one whose squares overflow
 float32 would fill Adam's second moment with Inf, so that these weights never move again. The norm
 of the whole gradient tells both; a loss that is not finite need not have such a gradient. Moments
-that hold NaN or Inf all the same (from outside, say) would harm the weights too.
+(Adam's two, Muon's momentum) that hold NaN or Inf all the same, from outside, say, would harm the
+weights too.
 
 A finite gradient can do harm as well: one 1e4 times as large as the others makes Adam's second
 moment so large that the next ten thousand steps are next to none. It is scaled down.
@@ -38,7 +39,7 @@ AVERAGED = 100
 """Steps that the average, of the norms' logarithms, goes back."""
 
 REPORT = "refused_step.pt"
-"""File for the weights, Adam's moments, the batch and its losses; `torch.load` reads it."""
+"""File for the weights, the moments, the batch and its losses; `torch.load` reads it."""
 
 REFUSED_IN_A_ROW = 10
 """Steps after which no other batch will help: the run stops."""
@@ -51,7 +52,7 @@ def gradient_norm(parameters: Iterable[nn.Parameter]) -> float:
 
 
 class StepGuard(Callback):
-    """Takes back the gradient of a step that would harm weights or moments: Adam then does nothing.
+    """Takes back the gradient of a step that would harm weights or moments: it then does nothing.
 
     A gradient far larger than the average is scaled down to it, and the step is taken.
 
@@ -135,7 +136,7 @@ class StepGuard(Callback):
                 f"is {losses[broken].tolist()}"
             )
         if not self._moments_usable:
-            return "Adam's moments hold NaN or Inf, which no gradient brought there"
+            return "the optimiser's moments hold NaN or Inf, which no gradient brought there"
         return (
             f"the gradient has the norm {self.gradient_norm:.3g}, from "
             f"{', '.join(self._unusable[:3]) or 'all weights together'} on, at losses up to "
@@ -163,11 +164,11 @@ def _usable(gradient: Tensor | None) -> bool:
 
 
 def _largest_moment(optimizer: torch.optim.Optimizer) -> float:
-    """Absolute value; NaN where one is."""
+    """Absolute value, over all that the optimiser keeps of earlier gradients; NaN where one is."""
     moments = [
-        state[name]
+        value
         for state in optimizer.state.values()
-        for name in ("exp_avg", "exp_avg_sq")
-        if name in state
+        for name, value in state.items()
+        if name != "step" and isinstance(value, Tensor)
     ]
     return float(torch.nn.utils.get_total_norm(moments, norm_type=math.inf)) if moments else 0.0

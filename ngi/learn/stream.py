@@ -96,6 +96,7 @@ class TrainingStream(IterableDataset[Batch]):
         self._resolution = schedule.resolution(0)  # of the latest proposals
         self._ahead: ProposalsAhead | None = None
         self._saved_stores: list[dict[str, Any]] = []  # of the last two checkpoints
+        self._kept_stores: list[dict[str, Any]] = []  # of one that is kept beside them
         self._pending: Batch | None = None
 
     @property
@@ -184,12 +185,16 @@ class TrainingStream(IterableDataset[Batch]):
         self._archive.restore(self.store, state["store"])
         self._saved_stores = [state["store"]]
 
+    def keep(self, state: dict[str, Any] | None = None) -> None:
+        """Keeps the patches of a saved state, by default the last, until this is called again."""
+        self._kept_stores = [self._saved_stores[-1] if state is None else state["store"]]
+
     def prune_archive(self) -> None:
-        """Deletes patches that neither of the last two saved states needs.
+        """Deletes patches that neither the last two saved states nor the kept one need.
 
         Call it once the last one is on disk.
         """
-        self._archive.prune(self._saved_stores)
+        self._archive.prune([*self._saved_stores, *self._kept_stores])
 
     def _next(self) -> Batch:
         ahead = self._propose()

@@ -1,14 +1,17 @@
 """The neural renderer, its loss, and what it says about single samples. PyTorch only."""
 
 from ngi.models.anf import AffinityDenoiser
+from ngi.models.averaging import Averaging, exponential_average, no_average
 from ngi.models.cnsr import CNSR
+from ngi.models.encoded_generator import EncodedGenerator
 from ngi.models.image_layers import ImageLinear
 from ngi.models.loss import L1Dssim, SampleLoss
+from ngi.models.muon import MuonAdam
 from ngi.models.patch_linear import PatchLinear
 from ngi.models.pixel_generator import PixelGenerator
 from ngi.models.sample_signals import (
-    adam_step_norm,
     output_gradient_norm,
+    sample_step_norm,
     step_norms_in_backward,
 )
 from ngi.models.sequence_loss import SequenceSmape
@@ -16,13 +19,18 @@ from ngi.models.sequence_loss import SequenceSmape
 __all__ = [
     "CNSR",
     "AffinityDenoiser",
+    "Averaging",
+    "EncodedGenerator",
     "ImageLinear",
     "L1Dssim",
+    "MuonAdam",
     "PatchLinear",
     "PixelGenerator",
     "SampleLoss",
     "SequenceSmape",
-    "adam_step_norm",
+    "exponential_average",
+    "no_average",
     "output_gradient_norm",
+    "sample_step_norm",
     "step_norms_in_backward",
 ]

@@ -56,7 +56,7 @@ class AdamStep:
 
     def squared_norm(self, gradients: Tensor) -> Tensor:
         """‖step(g_i)‖² of n gradients [n, *parameter.shape], [n]."""
-        chunks = gradients.split(_gradients_per_chunk(self.first))
+        chunks = gradients.split(gradients_per_chunk(self.first))
         norm = self.learning_rate * torch.cat([self._norm(g) for g in chunks])
         return norm * norm
 
@@ -67,27 +67,17 @@ class AdamStep:
         return torch.linalg.vector_norm(step.flatten(1), dim=1)
 
 
-def _gradients_per_chunk(parameter: Tensor) -> int:
+def gradients_per_chunk(parameter: Tensor) -> int:
     """How many gradients to treat at a time: on a CPU as many as stay in its cache."""
     elements = 2**20 if parameter.device.type == "cpu" else 2**26
     return max(1, elements // max(1, parameter.numel()))
 
 
-def adam_groups(optimizer: torch.optim.Optimizer) -> dict[Tensor, dict[str, Any]]:
-    """The parameter group of every parameter of a `torch.optim.Adam`.
-
-    Raises TypeError for another optimiser, ValueError for weight_decay, amsgrad or maximize.
-    """
-    if not isinstance(optimizer, torch.optim.Adam):
-        raise TypeError(
-            f"the norm of an Adam step was asked of {type(optimizer).__name__}: choose "
-            "torch.optim.Adam, or a target that needs no step norm"
-        )
-    for group in optimizer.param_groups:
-        for option in UNSUPPORTED:
-            if group[option]:
-                raise ValueError(
-                    f"optimizer.{option} is {group[option]}, which the norm of an Adam step does "
-                    "not support: switch it off, or choose a target that needs no step norm"
-                )
-    return {p: group for group in optimizer.param_groups for p in group["params"]}
+def check_adam(group: Mapping[str, Any]) -> None:
+    """Raises ValueError for a parameter group with weight_decay, amsgrad or maximize."""
+    for option in UNSUPPORTED:
+        if group[option]:
+            raise ValueError(
+                f"optimizer.{option} is {group[option]}, which the norm of an Adam step does "
+                "not support: switch it off, or choose a target that needs no step norm"
+            )

@@ -45,7 +45,7 @@ class ImageLinear:
         pass over memory, and in float32 PyTorch would ask MKL, which is slow on AMD's processors.
         """
         x = torch.cat(parts, dim=1)
-        if x.device.type == "cpu" and _computed_by_onednn(x.dtype):
+        if x.device.type == "cpu" and computed_by_onednn(x.dtype):
             after = ("none", []) if negative_slope is None else ("leaky_relu", [negative_slope])
             fused: Tensor = torch.ops.mkldnn._linear_pointwise(
                 x, self.weight, self.bias, *after, ""
@@ -64,7 +64,10 @@ def _aligned(columns: Tensor) -> Tensor:
     return F.pad(columns, (0, -columns.shape[1] % ALIGNMENT))
 
 
-def _computed_by_onednn(precision: torch.dtype) -> bool:
+def computed_by_onednn(precision: torch.dtype) -> bool:
+    """Whether oneDNN's fused layers are fast in this precision, and can be used here and now."""
+    if torch.compiler.is_compiling():  # a file for other programs knows standard operators only
+        return False
     if precision == torch.bfloat16:
         return bool(torch.ops.mkldnn._is_mkldnn_bf16_supported())
     return precision == torch.float32 and torch.backends.mkldnn.is_available()

@@ -8,13 +8,13 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
+from ngi.models.generator_inputs import check_inputs
 from ngi.models.image_layers import ImageLinear, layer_inputs
+from ngi.models.known_light import add_known_light
 from ngi.models.patch_linear import PatchLinear
 from ngi.patches import BufferLayout
 
 RADIANCE_CHANNELS = 3
-EMITTER_THRESHOLD = 1.0
-"""log1p of emitted radiance above which a pixel shows the emitter and nothing else."""
 CACHED_PIXELS = 8_192
 """Rendered at a time on a CPU: the features of so many stay in its caches."""
 MANY_PIXELS = 65_536
@@ -26,7 +26,7 @@ class PixelGenerator(nn.Module):
 
     The position buffer alone goes through the first layer; every later layer, the output layer
     included, sees [hidden features, all buffers, v]. Emission is no input: it is passed through,
-    in log1p space, by where(emission > 1, emission, output + emission).
+    and direct light, where the buffers hold it, is added to the output too (`add_known_light`).
 
     layout: the buffers of the scene
     scene_dimensions: D, the length of the scene vector v; may be 0
@@ -100,14 +100,16 @@ class PixelGenerator(nn.Module):
         scene_vector: [n, D] in [0, 1]
         Raises ValueError where these shapes do not fit.
         """
-        self._check(buffers, scene_vector)
+        check_inputs(
+            buffers, scene_vector, layout=self.layout, scene_dimensions=self.scene_dimensions
+        )
         pixels = buffers.flatten(1, 2)
         inputs = pixels[..., : self.layout.input_channels]  # emission is the last of the buffers
         features = self._activate(self._first_layer(pixels, inputs, scene_vector))
         for layer in self.hidden:
             features = self._activate(layer((features, inputs), scene_vector))
         output = self.output_layer((features, inputs), scene_vector).to(buffers.dtype)
-        return self._pass_emission_through(output.unflatten(1, buffers.shape[1:3]), buffers)
+        return add_known_light(output.unflatten(1, buffers.shape[1:3]), buffers, self.layout)
 
     @torch.no_grad()
     def render(
@@ -122,7 +124,12 @@ class PixelGenerator(nn.Module):
         """
         if pixels_per_chunk is not None and pixels_per_chunk < 1:
             raise ValueError(f"pixels_per_chunk is {pixels_per_chunk}: it must be at least 1")
-        self._check(buffers[None], scene_vector[None])
+        check_inputs(
+            buffers[None],
+            scene_vector[None],
+            layout=self.layout,
+            scene_dimensions=self.scene_dimensions,
+        )
         device = buffers.device.type
         precision = self.input_layer.weight.dtype
         if torch.is_autocast_enabled(device) and precision == torch.float32:
@@ -137,7 +144,7 @@ class PixelGenerator(nn.Module):
             chunks = buffers.flatten(0, 1).split(size)
             output = torch.cat([self._render_pixels(chunk, layers) for chunk in chunks])
         output = output.to(buffers.dtype).unflatten(0, buffers.shape[:2])
-        return self._pass_emission_through(output, buffers)
+        return add_known_light(output, buffers, self.layout)
 
     def _render_pixels(self, pixels: Tensor, layers: Sequence[ImageLinear]) -> Tensor:
         """Buffers [p, C] to the last layer's output [p, 3]."""
@@ -162,21 +169,3 @@ class PixelGenerator(nn.Module):
         # In place: PatchLinear's output is kept by nobody else, and memory traffic is what a
         # step spends beside its matrix products.
         return F.leaky_relu(features, self.negative_slope, inplace=True)
-
-    def _pass_emission_through(self, output: Tensor, buffers: Tensor) -> Tensor:
-        if "emission" not in self.layout.names:
-            return output
-        emission = buffers[..., self.layout.slice("emission")]
-        return torch.where(emission > EMITTER_THRESHOLD, emission, output + emission)
-
-    def _check(self, buffers: Tensor, scene_vector: Tensor) -> None:
-        if buffers.ndim != 4 or buffers.shape[-1] != self.layout.channels:
-            raise ValueError(
-                f"buffers of shape {list(buffers.shape)}: expected [n, H, W, "
-                f"{self.layout.channels}] for {list(self.layout.names)}"
-            )
-        if scene_vector.shape != (len(buffers), self.scene_dimensions):
-            raise ValueError(
-                f"scene vector of shape {list(scene_vector.shape)}: expected "
-                f"{[len(buffers), self.scene_dimensions]}"
-            )

@@ -11,9 +11,9 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 import torch
 from torch import Tensor, nn
 
-from ngi.models.adam_step import AdamStep, adam_groups
 from ngi.models.loss import SampleLoss
 from ngi.models.patch_linear import PatchLinear, SampleGradients
+from ngi.models.step_rules import StepRules
 
 
 def output_gradient_norm(prediction: Tensor, target: Tensor, loss: SampleLoss) -> Tensor:
@@ -28,22 +28,23 @@ def output_gradient_norm(prediction: Tensor, target: Tensor, loss: SampleLoss) -
     return torch.linalg.vector_norm(gradient.flatten(1), dim=1)
 
 
-def adam_step_norm(
+def sample_step_norm(
     model: nn.Module,
     loss: SampleLoss,
     optimizer: torch.optim.Optimizer,
     inputs: tuple[Tensor, ...],
     target: Tensor,
 ) -> tuple[Tensor, Tensor]:
-    """Loss of each sample, [n], and norm of the Adam step that it alone would cause, [n].
+    """Loss of each sample, [n], and norm of the step that it alone would cause, [n].
 
     The norm is that of the total step of all parameters, momentum and RMS included, with the
-    state that the optimiser holds (paper, Sec. 5.1); neither is changed. The release goes through
+    state that the optimiser holds (paper, Sec. 5.1); neither is changed. What it means for matrices
+    that Muon steps is said at `ngi.models.muon_step.MuonStep`. The release goes through
     the network once per sample, and takes 1 for the norm before the first step, where this takes
     the true norm.
 
     model: a network all of whose parameters belong to `PatchLinear` layers, each called once
-    optimizer: `torch.optim.Adam` over all parameters of the model
+    optimizer: `torch.optim.Adam` or `MuonAdam` over all parameters of the model
     inputs: the network's arguments, such as buffers [n, P, P, C] and v [n, D]
     target: [n, P, P, 3] log1p radiance as rendered
 
@@ -76,18 +77,18 @@ def step_norms_in_backward(
     That pass then forms the gradients of each sample and sums them up to those of the batch, which
     are the same as without, up to rounding.
     The model is called once inside the block. Gives a function that returns the norms of
-    `adam_step_norm`, [n], to be called when the backward pass is over and the optimiser has not
+    `sample_step_norm`, [n], to be called when the backward pass is over and the optimiser has not
     stepped yet or has: what it was before is what counts.
 
     gradient_scale: by which the gradients of the samples alone are larger than those that come
         by; n where the loss is the mean over n samples
     around: what is entered while the norms are computed, to time them
 
-    Raises as `adam_step_norm`.
+    Raises as `sample_step_norm`.
     """
     layers = _patch_linear_layers(model)
-    groups = adam_groups(optimizer)
-    if not all(parameter in groups for parameter in model.parameters()):
+    rules = StepRules(optimizer)
+    if not all(parameter in rules for parameter in model.parameters()):
         raise ValueError(
             "the optimizer does not hold every parameter of the model it is asked about"
         )
@@ -97,8 +98,7 @@ def step_norms_in_backward(
         def add_squared_norms(*gradients: Tensor) -> None:
             with around(), torch.no_grad():
                 for parameter, g in zip((layer.weight, layer.bias), gradients, strict=True):
-                    state = optimizer.state.get(parameter, {})
-                    step = AdamStep.of(parameter, groups[parameter], state).scaled(gradient_scale)
+                    step = rules.step(parameter).scaled(gradient_scale)
                     squared_norms.append(step.squared_norm(g))
 
         return add_squared_norms

@@ -65,7 +65,8 @@ class AnalyticRenderer(ClosedFormRenderer):
         albedo, roughness = 0.5 + 0.4 * wave[..., 3:6], 0.5 + 0.4 * wave[..., 6:]
         point = torch.nn.functional.pad(points, (0, 1))
         distance = (points - centre).square().sum(-1, keepdim=True)
-        radiance = albedo * (AMBIENT + SPOT * torch.exp(-distance / (2 * size**2)))
+        spot = SPOT * torch.exp(-distance / (2 * size**2))
+        radiance = albedo * (AMBIENT + spot)
         to_lamp = (points - torch.tensor(LAMP_CENTRE)).norm(dim=-1, keepdim=True)
         lamp = LAMP_RADIANCE * (to_lamp < LAMP_RADIUS).float().expand_as(point)
         if "emission" in self.layout.names:
@@ -79,6 +80,7 @@ class AnalyticRenderer(ClosedFormRenderer):
             "roughness": roughness.expand_as(distance),
             "throughput": torch.ones_like(point),
             "chain_roughness": torch.zeros_like(distance),
+            "direct": torch.log1p(albedo * spot),
             "emission": torch.log1p(lamp),
         }
         return torch.cat([buffers[name] for name in self.layout.names], -1), radiance

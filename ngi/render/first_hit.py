@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ngi.backend import dr, mi
 from ngi.patches import BufferLayout
+from ngi.render.direct_light import direct_light
 from ngi.render.emission import emission
 from ngi.render.materials import Material, collect_materials, evaluate_materials
-from ngi.render.needs import buffer_needs, needed_layout
+from ngi.render.needs import buffer_needs, direct_need, needed_layout
 from ngi.render.specular import SpecularChain, specular_chain
 from ngi.scene.variable_scene import VariableScene
 
 
 @dataclass(frozen=True)
 class FirstHit:
-    """Computes the channels of `BufferLayout` for camera rays, but emission as linear radiance.
+    """Computes the channels of `BufferLayout` for camera rays, but radiance linear.
 
-    The caller averages over the rays of a pixel and only then takes log1p of the emission, as it
-    does with the radiance, so that both agree where a pixel shows nothing but an emitter.
+    The caller averages over the rays of a pixel and only then takes log1p of emission and direct
+    light, as it does with the radiance, so that they agree where a pixel shows nothing else.
     """
 
     layout: BufferLayout
@@ -28,9 +30,13 @@ class FirstHit:
     bounds: tuple[tuple[float, ...], tuple[float, ...]]
     chain: SpecularChain | None
 
-    def channels(self, scene: mi.Scene, ray: mi.Ray3f) -> list[mi.Float]:
+    def channels(
+        self, scene: mi.Scene, ray: mi.Ray3f, light_point: Sequence[mi.Float]
+    ) -> list[mi.Float]:
         """One value per channel and ray; a ray that misses gives zeros, but the environment's
         emission and the throughput.
+
+        light_point: what `direct_light` takes; read where the layout has direct light.
         """
         traced: dict[str, list[mi.Float]] = {}
         if self.chain is not None:
@@ -43,6 +49,11 @@ class FirstHit:
             }
         hit = scene.ray_intersect(ray)
         valid = hit.is_valid()
+        if "direct" in self.layout.names:
+            direct = direct_light(scene, hit, light_point)
+            if self.chain is not None:
+                direct = dr.select(end.lit, end.throughput * direct, 0)
+            traced["direct"] = list(direct)
         low, high = map(np.array, self.bounds)
         extent = high - low
         albedo, roughness = evaluate_materials(self.materials, hit, valid)
@@ -64,14 +75,19 @@ class FirstHit:
         return channels
 
 
-def first_hit_of(scene: VariableScene, *, needed_only: bool, trace_specular: bool) -> FirstHit:
+def first_hit_of(
+    scene: VariableScene, *, needed_only: bool, trace_specular: bool, trace_direct: bool
+) -> FirstHit:
     """The buffers that a scene needs, or all; ValueError for a BSDF of an unknown kind.
 
     trace_specular: those of the first hit that is not specular (paper, Fig. 10).
+    trace_direct: the direct light too, see `ngi.render.direct_light`.
     """
     materials = collect_materials(scene.bsdfs())
     needs = buffer_needs(scene, materials)
     layout = needed_layout(needs) if needed_only else BufferLayout()
+    if trace_direct and (direct_need(scene).needed or not needed_only):
+        layout = layout.adding(["direct"])
     chain = specular_chain(scene, materials) if trace_specular else None
     return FirstHit(
         layout=layout if chain is None else layout.adding(chain.buffers),

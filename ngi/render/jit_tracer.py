@@ -17,6 +17,7 @@ import torch
 from torch import Tensor
 
 from ngi.backend import dr, mi
+from ngi.render.direct_light import light_points
 from ngi.render.first_hit import FirstHit
 from ngi.render.fitting import does_not_fit
 from ngi.render.tracing import Pending, Window, subpixel_points
@@ -43,7 +44,8 @@ class JitTracer:
         self._buffer_samples = buffer_samples
         points = subpixel_points(buffer_samples)
         self._points = mi.Point2f(points[:, 0], points[:, 1])
-        dr.eval(self._points)
+        self._light_points = [mi.Float(numbers) for numbers in light_points(buffer_samples).T]
+        dr.eval(self._points, self._light_points)
         # Plain functions, not methods: a frozen function follows the arrays of its arguments only,
         # and holds what is constant for this tracer in its closure.
         integrator = scene.integrator()
@@ -59,12 +61,19 @@ class JitTracer:
             return _block_sums(list(mi.Color3f(radiance)), samples)
 
         def trace_buffers(
-            scene: mi.Scene, view: _View, points: mi.Point2f, samples: int, rays: int
+            scene: mi.Scene,
+            view: _View,
+            points: mi.Point2f,
+            light_points: list[mi.Float],
+            samples: int,
+            rays: int,
         ) -> list[mi.Float]:
             index = dr.arange(mi.UInt32, rays)
             pixel = index // view.samples
-            jitter = dr.gather(mi.Point2f, points, index - pixel * view.samples)
-            channels = first_hit.channels(scene, view.rays(scene, pixel, jitter))
+            sample = index - pixel * view.samples
+            jitter = dr.gather(mi.Point2f, points, sample)
+            light_point = [dr.gather(mi.Float, numbers, sample) for numbers in light_points]
+            channels = first_hit.channels(scene, view.rays(scene, pixel, jitter), light_point)
             return _block_sums(channels, samples)
 
         self._radiance = _replayed(trace_radiance) if frozen else trace_radiance
@@ -84,7 +93,8 @@ class JitTracer:
         samples = self._buffer_samples
         view = _View.of(window, samples)
         rays = window.width * window.height * samples
-        sums = self._buffers(self._scene, view, self._points, samples, rays)
+        points = self._points, self._light_points
+        sums = self._buffers(self._scene, view, *points, samples, rays)
         return _pending(sums, window, samples)
 
     def _prepare(self, window: Window) -> None:

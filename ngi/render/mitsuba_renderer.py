@@ -41,6 +41,8 @@ class MitsubaRenderer:
     buffer_samples: rays per pixel of the buffers; `BUFFER_SAMPLES` where None.
     specular: 'learned': the buffers are those of the first hit; 'traced': of the first hit that is
         not specular (paper, Fig. 10), see `ngi.render.specular`.
+    direct: 'traced': the buffers also hold the direct light, see `ngi.render.direct_light`;
+        'learned': they do not.
     needed_only: leave out what the scene does not need: buffers that tell nothing, static buffers
         rendered again, and most of the rebuilding of what does not move.
 
@@ -61,21 +63,26 @@ class MitsubaRenderer:
         samples_per_pixel: int | None = None,
         buffer_samples: int | None = None,
         specular: str = "learned",
+        direct: str = "learned",
         needed_only: bool = True,
     ) -> None:
         given = {"samples_per_pixel": samples_per_pixel, "buffer_samples": buffer_samples}
         require_positive(
             patch_size=patch_size, **{name: n for name, n in given.items() if n is not None}
         )
-        if specular not in ("learned", "traced"):
-            raise ValueError(f"renderer.specular '{specular}': choose 'learned' or 'traced'")
+        for name, choice in (("specular", specular), ("direct", direct)):
+            if choice not in ("learned", "traced"):
+                raise ValueError(f"renderer.{name} '{choice}': choose 'learned' or 'traced'")
         self._variant = activate(backend)
         # Scenes of a sweep's finished jobs are left in cycles, and slow every launch down.
         gc.collect()
         self._scene = VariableScene(scene, arrange=needed_only)
         self._require_square_film()
         first_hit = first_hit_of(
-            self._scene, needed_only=needed_only, trace_specular=specular == "traced"
+            self._scene,
+            needed_only=needed_only,
+            trace_specular=specular == "traced",
+            trace_direct=direct == "traced",
         )
         buffer_samples = buffer_samples or BUFFER_SAMPLES[self._variant]
         self._buffer_samples = buffer_samples
@@ -236,14 +243,15 @@ class MitsubaRenderer:
         return radiance, lambda: buffers
 
     def _whole_buffers(self, resolution: int) -> Tensor:
-        """[H, W, C] of the scene as it stands, emission linear; no NaN or Inf."""
+        """[H, W, C] of the scene as it stands, radiance linear; no NaN or Inf."""
         all_bands = bands(resolution, self._buffer_samples)
         return torch.cat([_masked(self._image_tracer.buffers(band)()) for band in all_bands])
 
     def _encode(self, buffers: Tensor) -> Tensor:
-        """Emission becomes log1p of its mean, in place."""
-        if "emission" in self.layout.names:
-            buffers[..., self.layout.slice("emission")].log1p_()
+        """Emission and direct light become log1p of their means, in place."""
+        for name in ("direct", "emission"):
+            if name in self.layout.names:
+                buffers[..., self.layout.slice(name)].log1p_()
         return buffers
 
     def _require_square_film(self) -> None:

@@ -11,6 +11,9 @@ from ngi.patches import BufferLayout
 from ngi.render.materials import Material
 from ngi.scene.variable_scene import VariableScene
 
+_NEVER_SAMPLED = {"DirectionalArea"}
+"""Emitters in one direction from an area, which Mitsuba's path tracer never meets."""
+
 
 @dataclass(frozen=True)
 class BufferNeed:
@@ -36,12 +39,28 @@ def buffer_needs(scene: VariableScene, materials: list[Material]) -> list[Buffer
     ]
 
 
+def direct_need(scene: VariableScene) -> BufferNeed:
+    """Whether there is direct light to trace, where that is asked for."""
+    if all(emitter.class_name() in _NEVER_SAMPLED for emitter in scene.scene.emitters()):
+        return BufferNeed("direct", False, "nothing emits that a path could reach")
+    if 0 <= scene.description.max_depth < 2:
+        return BufferNeed("direct", False, "the scene's paths end at the first surface")
+    if not scene.bsdfs():
+        return BufferNeed("direct", False, "there is no surface")
+    return BufferNeed("direct", True, "emitters light the surfaces")
+
+
 def needed_layout(needs: list[BufferNeed]) -> BufferLayout:
     return BufferLayout(tuple(need.buffer for need in needs if need.needed))
 
 
 def buffers_are_static(scene: VariableScene, layout: BufferLayout) -> bool:
-    """Whether these buffers of a pixel are the same for every v."""
+    """Whether these buffers of a pixel are the same for every v.
+
+    Direct light differs with whatever varies.
+    """
+    if "direct" in layout.names and scene.description.variables:
+        return False
     return not scene.affected & {"camera", "position", *layout.names}
 
 

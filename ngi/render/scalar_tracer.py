@@ -7,6 +7,7 @@ import torch
 from numpy.typing import NDArray
 
 from ngi.backend import mi
+from ngi.render.direct_light import light_points
 from ngi.render.first_hit import FirstHit
 from ngi.render.tracing import Pending, Window, subpixel_points
 
@@ -23,6 +24,7 @@ class ScalarTracer:
         self._scene = scene
         self._first_hit = first_hit
         self._points = subpixel_points(buffer_samples)
+        self._light_points = light_points(buffer_samples)
         self._sensor = _box_filtered_copy(scene.sensors()[0])
         self._copy = mi.traverse(self._sensor)
 
@@ -54,9 +56,10 @@ class ScalarTracer:
     def _pixel(self, x: int, y: int, resolution: int) -> NDArray[np.float64]:
         sensor = self._scene.sensors()[0]
         samples = []
-        for point in (self._points + np.array([x, y])) / resolution:
+        points = (self._points + np.array([x, y])) / resolution
+        for point, light_point in zip(points, self._light_points, strict=True):
             ray, _ = sensor.sample_ray(0, 0, mi.Point2f(point), mi.Point2f(0.5))
-            samples.append(self._first_hit.channels(self._scene, ray))
+            samples.append(self._first_hit.channels(self._scene, ray, light_point.tolist()))
         return np.mean(np.array(samples, dtype=np.float64), axis=0)
 
 

@@ -34,25 +34,28 @@ class ChainEnd:
     roughness: sqrt(sum of alpha^2) over the bounces.
     emission: linear radiance of every emitter on the way, the environment included, times the
         throughput up to it.
+    lit: whether the scene's paths are long enough to bring an emitter's light to the end.
     """
 
     ray: mi.Ray3f
     throughput: mi.Color3f
     roughness: mi.Float
     emission: mi.Color3f
+    lit: mi.Bool
 
 
 @dataclass(frozen=True)
 class SpecularChain:
     """Follows camera rays through the specular surfaces of a scene.
 
-    surfaces: at least one. maximum_bounces: at least 1.
+    surfaces: at least one. maximum_bounces: at least 1. longest_path: the scene's max_depth.
     buffers: those that the scene carries because of them. Once there are bounces, the position
         does not tell the outgoing direction any more, nor does the camera's view what is seen.
     """
 
     surfaces: list[SpecularSurface]
     maximum_bounces: int
+    longest_path: int
     buffers: tuple[str, ...]
 
     def follow(self, scene: mi.Scene, ray: mi.Ray3f) -> ChainEnd:
@@ -79,7 +82,7 @@ class SpecularChain:
                 goes_on,
             )
 
-        ray, throughput, variance, emitted, _, _ = dr.while_loop(
+        ray, throughput, variance, emitted, segments, _ = dr.while_loop(
             state=(
                 mi.Ray3f(ray),
                 mi.Color3f(1),
@@ -91,7 +94,9 @@ class SpecularChain:
             cond=lambda *state: state[-1],
             body=step,
         )
-        return ChainEnd(ray, throughput, dr.sqrt(variance), emitted)
+        # Emitter, end of the chain, a vertex at each of its bounces: one more than the segments.
+        lit = mi.Bool(True) if self.longest_path < 0 else segments < self.longest_path
+        return ChainEnd(ray, throughput, dr.sqrt(variance), emitted, lit)
 
     def _bounce(
         self, hit: mi.SurfaceInteraction3f, active: mi.Bool
@@ -137,4 +142,4 @@ def specular_chain(scene: VariableScene, materials: list[Material]) -> SpecularC
         buffers.append("chain_roughness")
     if scene.scene.environment() or any(shape.is_emitter() for shape in scene.shapes):
         buffers.append("emission")
-    return SpecularChain(surfaces, bounces, tuple(buffers))
+    return SpecularChain(surfaces, bounces, longest_path, tuple(buffers))

@@ -35,7 +35,7 @@ class Tracer(Protocol):
         ...
 
     def buffers(self, window: Window) -> Pending:
-        """Mean first-hit channels (emission linear) over the same sub-pixel points everywhere."""
+        """Mean first-hit channels (radiance linear) over the same sub-pixel points everywhere."""
         ...
 
 

@@ -21,7 +21,7 @@ from ngi.scene.variable_scene import VariableScene
 def describe_scene(description: SceneDescription) -> tuple[str, list[str]]:
     """A text about a variable scene, and what is wrong with it."""
     from ngi.render.materials import collect_materials
-    from ngi.render.needs import buffer_needs, buffers_are_static, needed_layout
+    from ngi.render.needs import buffer_needs, buffers_are_static, direct_need, needed_layout
 
     scene = VariableScene(description)
     lines = [
@@ -42,6 +42,9 @@ def describe_scene(description: SceneDescription) -> tuple[str, list[str]]:
     needs = buffer_needs(scene, collect_materials(scene.bsdfs()))
     for need in needs:
         lines.append(f"  {need.buffer:>9}  {'kept' if need.needed else 'left out'}: {need.why}")
+    direct = direct_need(scene)
+    kept = "kept with renderer.direct=traced" if direct.needed else "left out"
+    lines.append(f"  {direct.buffer:>9}  {kept}: {direct.why}")
     if buffers_are_static(scene, needed_layout(needs)):
         lines.append("  no variable changes a buffer: they are rendered once per resolution")
     lines += ["", "geometry:", f"  {_geometry(scene)}"]

@@ -52,7 +52,7 @@ def buffer_picture(name: str, buffer: Tensor) -> Image.Image:
     if name == "outgoing":
         buffer = buffer / 2 + 0.5
     colours = buffer.clamp(0, 1).expand(*buffer.shape[:2], 3)
-    if name in ("albedo", "emission", "throughput"):
+    if name in ("albedo", "direct", "emission", "throughput"):
         return srgb_picture(colours, 0.0)
     return Image.fromarray((colours * 255).to(torch.uint8).numpy())
 

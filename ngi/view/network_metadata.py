@@ -20,6 +20,8 @@ BUFFERS = {
     "roughness": "alpha of GGX or Beckmann; 0 where perfectly smooth, 1 where diffuse",
     "throughput": "of the specular bounces before the surface, linear RGB; 1 where there is none",
     "chain_roughness": "sqrt of the sum of alpha^2 over these bounces",
+    "direct": "log(1 + x) of the pixel's mean direct light x, linear RGB: the radiance that leaves "
+    "the surface towards the camera after one bounce from an emitter, times the throughput",
     "emission": "log(1 + x) of the mean emitted radiance x of the pixel, linear RGB",
 }
 """What the channels of `BufferLayout` are."""

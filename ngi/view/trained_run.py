@@ -24,13 +24,15 @@ from ngi.view.run_settings import (
 )
 
 CHECKPOINTS = ("last.ckpt", "previous.ckpt")
-NETWORK = "network."
-"""What the names of the network's weights begin with in a checkpoint."""
+NETWORK, AVERAGED = "network.", "averaged.module."
+"""What the names of the network's weights, and of their average, begin with in a checkpoint."""
 
 
 @dataclass(frozen=True)
 class TrainedRun:
     """The network as the newest checkpoint of a run has it, and the renderer of its scene.
+
+    Its weights are the averaged ones where the run has such, as in its evaluations.
 
     step: training steps it has had
     precision: as Lightning names that of training, which is that of `predict` too
@@ -71,14 +73,9 @@ class TrainedRun:
         network = made_by(settings, "model")(
             **plain(settings["model"]),
             layout=samples.layout,
-            scene_dimensions=samples.dimensions,
+            scene_dimensions=samples.network_dimensions,
         )
-        weights = {
-            name.removeprefix(NETWORK): value
-            for name, value in checkpoint["state_dict"].items()
-            if name.startswith(NETWORK)
-        }
-        network.load_state_dict(weights)
+        network.load_state_dict(_weights(checkpoint["state_dict"]))
         device = "cuda" if torch.cuda.is_available() else "cpu"
         return cls(
             folder=folder,
@@ -106,6 +103,14 @@ class TrainedRun:
         """[H, W, 3]: what the network says of a v of shape [D]; linear RGB, possibly negative."""
         buffers = self.renderer.image_buffers(scene_vector, resolution=resolution)
         return torch.expm1(self.predict(buffers, scene_vector))
+
+
+def _weights(state: dict[str, Tensor]) -> dict[str, Tensor]:
+    """The network's, of all that a checkpoint has."""
+    prefix = AVERAGED if any(name.startswith(AVERAGED) for name in state) else NETWORK
+    return {
+        name.removeprefix(prefix): value for name, value in state.items() if name.startswith(prefix)
+    }
 
 
 def _newest(folder: Path) -> dict[str, Any]:

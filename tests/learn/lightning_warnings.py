@@ -11,3 +11,6 @@ IGNORED = [
     )
 ]
 """The reasons stand there."""
+
+RESUMED = pytest.mark.filterwarnings("ignore:.*your dataloader is not resumable")
+"""For runs that go on."""

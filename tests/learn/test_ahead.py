@@ -11,7 +11,13 @@ import pytest
 import torch
 
 from ngi.explore import GrowingResolution, LossTimesStep
-from ngi.learn import IlluminationModule, PatchSamples, PhaseClock, TrainingStream, seeded
+from ngi.learn import (
+    IlluminationModule,
+    PhaseClock,
+    TrainingStream,
+    patch_example,
+    seeded,
+)
 from ngi.learn.ahead import ProposalsAhead
 from ngi.learn.batch import Batch
 from ngi.models import L1Dssim, PixelGenerator
@@ -54,7 +60,7 @@ def network() -> IlluminationModule:
         optimizer=lambda parameters: torch.optim.Adam(parameters, lr=1e-2),
         target=LossTimesStep(),
         clock=PhaseClock(),
-        example=PatchSamples.example,
+        example=patch_example,
     )
     optimizer = module.configure_optimizers()
     module.optimizers = lambda **_: optimizer

@@ -22,7 +22,11 @@ from tests.learn.command_line import BRIEF, run
         (["renderer.patch_size=8"], ["window", "8 x 8"]),
         (["reuse.when_late=maybe"], ["reuse.when_late", "maybe"]),
         (["optimizer._target_=torch.optim.AdamW"], ["Adam", "AdamW"]),
+        (["optimizer._target_=torch.optim.SGD"], ["SGD", "optimizer=muon"]),
         (["optimizer.lr=-1"], ["learning rate", "-1"]),
+        (["optimizer=muon", "optimizer.momentum=1"], ["optimizer.momentum: 1"]),
+        (["schedule=warmup_stable_decay"], ["schedule.warmup_steps: 30", "budget.steps: 12"]),
+        (["averaging=exponential", "averaging.decay=1"], ["averaging.decay: 1"]),
     ],
 )
 def test_each_error_names_its_key_and_value(

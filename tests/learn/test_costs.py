@@ -13,6 +13,7 @@ from ngi.build import run_components
 from ngi.learn import Component, CostFile, ModelClock
 from ngi.learn.batch import Counters
 from ngi.learn.clock import PAUSES, PHASES
+from ngi.learn.costs import NOT_AVERAGED
 from ngi.render import AnalyticRenderer
 from tests.learn.composition import run_config
 
@@ -88,13 +89,27 @@ def test_methods_share_what_they_have_in_common() -> None:
         ("budget.seconds=7", set()),
         ("model.hidden_features=16", {"training", "scoring"}),
         ("trainer=bf16", {"training", "scoring"}),
+        ("optimizer=muon", {"training", "scoring"}),
+        ("averaging=exponential", {"training", "scoring"}),
+        ("schedule=warmup_stable_decay", set()),
         ("+renderer.samples_per_pixel=9", {"rendering"}),
+        ("+renderer.direct=traced", {"rendering"}),
         ("sampler.chains=8", {"training", "exploring", "rendering", "scoring"}),
     ],
 )
 def test_a_cost_is_known_by_what_it_depends_on(override: str, changed: set[str]) -> None:
     before, after = keys(), keys(override)
     assert {name for name in before if before[name] != after[name]} == changed
+
+
+def test_how_fast_and_how_far_back_is_no_question_of_cost() -> None:
+    learner = ("optimizer=muon", "averaging=exponential")
+    changed = ("optimizer.lr=0.5", "optimizer.adam_lr=0.5", "averaging.decay=0.5")
+    assert keys(*learner) == keys(*learner, *changed)
+
+
+def test_without_an_average_a_cost_is_called_as_before_there_were_any() -> None:
+    assert run_config().averaging["_target_"] == NOT_AVERAGED
 
 
 def test_scenes_of_other_dimensions_share_nothing() -> None:

@@ -1,3 +1,4 @@
+from contextlib import nullcontext
 from types import SimpleNamespace
 
 import pytest
@@ -5,8 +6,8 @@ import torch
 from torch.func import grad
 
 from ngi.explore import Loss, LossTimesOutputGradient, LossTimesStep, Target
-from ngi.learn import Batch, IlluminationModule, PatchSamples, PhaseClock, seeded
-from ngi.models import L1Dssim, PixelGenerator, adam_step_norm
+from ngi.learn import Batch, IlluminationModule, PhaseClock, patch_example, seeded
+from ngi.models import L1Dssim, PixelGenerator, exponential_average, sample_step_norm
 from ngi.patches import BufferLayout, Patches
 
 LAYOUT = BufferLayout()
@@ -39,7 +40,7 @@ def module(target: Target) -> IlluminationModule:
         optimizer=lambda parameters: torch.optim.Adam(parameters, lr=1e-2),
         target=target,
         clock=PhaseClock(),
-        example=PatchSamples.example,
+        example=patch_example,
     )
     optimizer = made.configure_optimizers()
     made.optimizers = lambda **_: optimizer  # type: ignore[method-assign]
@@ -54,7 +55,7 @@ def direct_scores(made: IlluminationModule, target: Target, samples: Patches) ->
     if isinstance(target, Loss):
         return losses
     if isinstance(target, LossTimesStep):
-        _, norms = adam_step_norm(
+        _, norms = sample_step_norm(
             made.network,
             LOSS,
             made.optimizers(),  # type: ignore[arg-type]
@@ -114,6 +115,31 @@ def test_weights_scale_what_each_sample_does_and_not_what_is_said_of_it() -> Non
     mean = sum(w * loss for w, loss in zip(weights.tolist(), losses, strict=True)) / 4
     for ours, expected in zip(found, torch.autograd.grad(mean, parameters), strict=True):
         torch.testing.assert_close(ours, expected)
+
+
+def test_after_each_step_the_average_follows_and_is_what_predicts() -> None:
+    made = module(Loss())
+    made.averaged = exponential_average(made.network, decay=0.98)
+    reference = exponential_average(made.network, decay=0.98)
+    batch = Batch(patches(4, 0), torch.arange(4), False, None)
+
+    def closure() -> torch.Tensor:
+        loss = made.training_step(batch, 0)["loss"]
+        loss.backward()
+        return loss
+
+    made._trainer = SimpleNamespace(  # type: ignore[assignment]
+        precision_plugin=SimpleNamespace(forward_context=nullcontext)
+    )
+    for step in range(3):
+        made.optimizer_step(0, step, made.optimizers(), closure)
+        reference.update_parameters(made.network)
+    for ours, expected in zip(made.averaged.parameters(), reference.parameters(), strict=True):
+        assert torch.equal(ours, expected)
+    inputs = (batch.patches.buffers[0], batch.patches.scene_vector[0])
+    expected = reference.module.render(*inputs).float()
+    assert torch.equal(made.predict(*inputs), expected)
+    assert not torch.equal(made.network.render(*inputs).float(), expected)
 
 
 def test_initial_weights_depend_on_the_seed_alone() -> None:

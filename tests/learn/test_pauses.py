@@ -9,6 +9,7 @@ import pytest
 from ngi.learn import Budget, Interruption, PhaseClock, TrainingStream
 from ngi.learn.callbacks import PeriodicEvaluation
 from ngi.learn.saving import BudgetAndCheckpoint
+from ngi.learn.schedule import ConstantRate
 from ngi.reuse import FixedProbability
 from tests.learn.late_renderers import Manual, ManualJob
 from tests.learn.small_stream import make, steps
@@ -50,6 +51,7 @@ def test_a_checkpoint_waits_for_patches_unless_the_run_is_over(
     folder: Any = SimpleNamespace(
         path=tmp_path / "run",
         checkpoint=tmp_path / "last.ckpt",
+        stable_checkpoint=tmp_path / "stable.ckpt",
         logs=(),
     )
     trainer: Any = SimpleNamespace(
@@ -57,6 +59,7 @@ def test_a_checkpoint_waits_for_patches_unless_the_run_is_over(
     )
     callback = BudgetAndCheckpoint(
         budget=Budget(steps=budget),
+        schedule=ConstantRate(),
         stream=stream,
         clock=clock,
         run_clock=clock,

@@ -6,6 +6,7 @@ import logging
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -17,15 +18,16 @@ from ngi.explore import LossTimesStep
 from ngi.learn import (
     ExplorationDataModule,
     IlluminationModule,
-    PatchSamples,
     PhaseClock,
     StepGuard,
+    patch_example,
     seeded,
 )
 from ngi.learn.lightning_api import Callback, Trainer
+from ngi.learn.module import OptimizerFactory
 from ngi.learn.step_guard import LARGEST_NORM, REFUSED_IN_A_ROW
 from ngi.learn.stream import TrainingStream
-from ngi.models import L1Dssim, PixelGenerator
+from ngi.models import L1Dssim, MuonAdam, PixelGenerator
 from ngi.render import AnalyticRenderer, RenderedPatches
 from tests.learn.lightning_warnings import IGNORED
 from tests.learn.small_stream import make
@@ -35,6 +37,7 @@ Disturbance = Callable[[int, Tensor], Tensor]
 
 pytestmark = IGNORED
 
+ADAM = partial(torch.optim.Adam, lr=1e-2)
 LOSS = L1Dssim(l1_weight=1.0, dssim_weight=1.0, window_size=5)
 
 
@@ -70,20 +73,22 @@ def train(
     gradient: Disturbance = unchanged,
     renderer: AnalyticRenderer | None = None,
     callbacks: Sequence[Callback] = (),
+    optimizer: OptimizerFactory = ADAM,
+    features: int = 8,
 ) -> Feedback:
     stream = make(folder, greedy=True, renderer=renderer)
     module = IlluminationModule(
         network=seeded(PixelGenerator, seed=0)(
             layout=AnalyticRenderer(dimensions=3, patch_size=8).layout,
             scene_dimensions=3,
-            hidden_features=8,
+            hidden_features=features,
             hidden_layers=2,
         ),
         loss=OddLoss(losses, stream),
-        optimizer=lambda parameters: torch.optim.Adam(parameters, lr=1e-2),
+        optimizer=optimizer,
         target=LossTimesStep(),
         clock=PhaseClock(),
-        example=PatchSamples.example,
+        example=patch_example,
     )
     count = iter(range(1, steps + 1))
     module.network.output_layer.weight.register_hook(lambda g: gradient(next(count), g))
@@ -163,6 +168,27 @@ def test_a_large_gradient_is_scaled_down_to_the_average_and_taken(tmp_path: Path
     assert 0.3 < gained / first < 3
 
 
+def test_a_large_gradient_is_no_more_than_an_average_one_to_muon(tmp_path: Path) -> None:
+    momenta: list[float] = []
+
+    class Momenta(Callback):
+        def on_train_batch_end(self, trainer, *_) -> None:
+            states = trainer.optimizers[0].state.values()
+            momenta.append(sum(float(s["momentum_buffer"].norm()) for s in states if len(s) == 1))
+
+    feedback = train(
+        tmp_path,
+        6,
+        gradient=at(4, LARGEST_NORM / 4),
+        callbacks=[Momenta()],
+        optimizer=MuonAdam,
+        features=12,
+    )
+    assert feedback.stream.counters.steps_scaled == 1
+    assert feedback.weights[-1].isfinite().all()
+    assert momenta[3] < 2 * momenta[2]
+
+
 def test_gradients_that_stay_large_are_taken_as_they_are_in_the_end(tmp_path: Path) -> None:
     def larger(step: int, gradient: Tensor) -> Tensor:
         return gradient * (1e6 if step > 5 else 1)
@@ -197,14 +223,21 @@ def test_refusals_in_a_row_stop_the_run_with_what_does_the_last_one_again(tmp_pa
     assert report["optimizer"]["state"] == {}  # no step was taken
 
 
-def test_moments_that_hold_nan_never_reach_the_weights(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("optimizer", "name"),
+    [(ADAM, "exp_avg_sq"), (MuonAdam, "exp_avg"), (MuonAdam, "momentum_buffer")],
+)
+def test_moments_that_hold_nan_never_reach_the_weights(
+    tmp_path: Path, optimizer: OptimizerFactory, name: str
+) -> None:
     class Poison(Callback):
         def on_train_batch_start(self, trainer, _module, *_) -> None:
-            for state in list(trainer.optimizers[0].state.values())[:1]:
-                state["exp_avg_sq"].flatten()[0] = math.nan
+            states = trainer.optimizers[0].state.values()
+            for moments in [state[name] for state in states if name in state][:1]:
+                moments.flatten()[0] = math.nan
 
-    with pytest.raises(FloatingPointError, match="Adam's moments hold NaN or Inf"):
-        train(tmp_path, 30, callbacks=[Poison()])
+    with pytest.raises(FloatingPointError, match="moments hold NaN or Inf"):
+        train(tmp_path, 30, callbacks=[Poison()], optimizer=optimizer, features=12)
     report = torch.load(tmp_path / "refused_step.pt", weights_only=True)
     assert report["step"] == 1 + REFUSED_IN_A_ROW  # before the first there are no moments
     assert all(weights.isfinite().all() for weights in report["weights"].values())

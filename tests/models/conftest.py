@@ -27,10 +27,14 @@ def plain_forward(
         x = F.leaky_relu(x, model.negative_slope)
     x = torch.cat([x, inputs], dim=-1)
     output = F.linear(x, parameters["output_layer.weight"], parameters["output_layer.bias"])
+    radiance = torch.zeros_like(output)
+    for name in {"direct", "emission"} & {*layout.names}:
+        radiance = radiance + buffers[..., layout.slice(name)].exp() - 1
+    output = output + torch.log1p(radiance)
     if "emission" not in layout.names:
         return output
     emission = buffers[..., layout.slice("emission")]
-    return torch.where(emission > 1, emission, output + emission)
+    return torch.where(emission > 1, emission, output)
 
 
 @dataclass

@@ -1,3 +1,5 @@
+import math
+
 import pytest
 import torch
 from torch import nn
@@ -15,6 +17,8 @@ CASES = [
     {"names": tuple(BUFFER_CHANNELS), "hidden_layers": 1},
     {"names": ("position",), "negative_slope": 0.2},
     {"names": ("position", "albedo"), "hidden_layers": 8},
+    {"names": ("position", "direct", "emission")},
+    {"names": ("position", "albedo", "direct")},
 ]
 
 
@@ -91,9 +95,34 @@ def test_bright_emitters_show_themselves_and_dim_ones_add(make_model, make_batch
     torch.testing.assert_close(output[..., 2], dark[..., 2])
 
 
+def test_direct_light_is_an_input_and_is_added_as_radiance(make_model, make_batch) -> None:
+    model = make_model(names=("position", "direct", "emission"))
+    with torch.no_grad():
+        model.output_layer.weight.zero_()
+        model.output_layer.bias.copy_(torch.tensor([0.25, 0.0, -0.5]))
+    batch = make_batch(model)
+    direct, emitted = torch.tensor([3.0, 0.5, 0.0]), torch.tensor([0.7, 0.0, 2.5])  # radiance
+    batch.buffers[..., 3:6], batch.buffers[..., 6:] = direct.log1p(), emitted.log1p()
+    expected = torch.tensor([0.25 + math.log(4.7), math.log(1.5), math.log(3.5)])
+    for image in (
+        model(batch.buffers, batch.scene_vector),
+        model.render(batch.buffers[0], batch.scene_vector[0]),
+    ):
+        torch.testing.assert_close(image, expected.expand_as(image))
+    model = make_model(names=("position", "direct", "emission"))
+    lit = model(batch.buffers, batch.scene_vector)
+    batch.buffers[..., 3:6] = 0
+    dark = model(batch.buffers, batch.scene_vector)
+    learnt = (lit - dark)[..., 1] - math.log(1.5)
+    assert learnt.abs().mean() > 1e-3, "the layers do not see it"
+
+
+@pytest.mark.parametrize("names", [("position", "emission"), ("position", "direct", "emission")])
 @pytest.mark.parametrize("pixels_per_chunk", [1, 7, 30, 1000])
-def test_rendering_in_chunks_changes_nothing(make_model, make_batch, pixels_per_chunk) -> None:
-    model = make_model().double()
+def test_rendering_in_chunks_changes_nothing(
+    make_model, make_batch, pixels_per_chunk, names
+) -> None:
+    model = make_model(names=names).double()
     batch = make_batch(model, samples=1)
     image = model.render(batch.buffers[0], batch.scene_vector[0], pixels_per_chunk)
     assert not image.requires_grad

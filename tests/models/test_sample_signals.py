@@ -9,8 +9,8 @@ from ngi.models import (
     L1Dssim,
     PatchLinear,
     adam_step,
-    adam_step_norm,
     output_gradient_norm,
+    sample_step_norm,
     step_norms_in_backward,
 )
 
@@ -32,7 +32,9 @@ def train(model, optimizer, batch, steps) -> None:
 
 
 def step_norms(model, optimizer, batch, loss=LOSS):
-    return adam_step_norm(model, loss, optimizer, (batch.buffers, batch.scene_vector), batch.target)
+    return sample_step_norm(
+        model, loss, optimizer, (batch.buffers, batch.scene_vector), batch.target
+    )
 
 
 def watched_layers(model) -> list[nn.Module]:
@@ -122,7 +124,7 @@ def test_chunks_change_nothing(make_model, make_batch, monkeypatch, samples) -> 
     batch = make_batch(model)
     optimizer = adam(model)
     _, expected = step_norms(model, optimizer, batch)
-    monkeypatch.setattr(adam_step, "_gradients_per_chunk", lambda _: samples)
+    monkeypatch.setattr(adam_step, "gradients_per_chunk", lambda _: samples)
     torch.testing.assert_close(step_norms(model, optimizer, batch)[1], expected)
 
 

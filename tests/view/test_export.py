@@ -12,9 +12,10 @@ import pytest
 import torch
 
 from ngi.models import PixelGenerator
-from ngi.patches import BUFFER_CHANNELS, CHAIN_CHANNELS
+from ngi.patches import BUFFER_CHANNELS, CHAIN_CHANNELS, DIRECT_CHANNELS, BufferLayout
 from ngi.scene import read_scene, scenes
 from ngi.view import export
+from ngi.view.network_file import largest_difference, network_file
 from ngi.view.network_metadata import BUFFERS, scene_metadata
 from ngi.view.trained_run import TrainedRun
 from tests.learn.command_line import run
@@ -114,7 +115,18 @@ def test_the_file_says_what_its_inputs_are(
         ("roughness", 12, 1),
         ("emission", 13, 3),
     ]
-    assert BUFFERS.keys() == BUFFER_CHANNELS.keys() | CHAIN_CHANNELS.keys()
+    assert BUFFERS.keys() == BUFFER_CHANNELS.keys() | CHAIN_CHANNELS.keys() | DIRECT_CHANNELS.keys()
+
+
+def test_a_network_that_adds_direct_light_gives_the_same_numbers() -> None:
+    layout = BufferLayout(("position", "direct", "emission"))
+    with torch.random.fork_rng():
+        torch.manual_seed(0)
+        network = PixelGenerator(
+            layout=layout, scene_dimensions=2, hidden_features=8, hidden_layers=2
+        )
+        buffers, v = 2 * torch.rand(20, layout.channels), torch.rand(2)
+    assert largest_difference(network_file(network, {}), network, buffers, v) < 1e-5
 
 
 def test_it_tells_no_path_of_this_machine(exported: Path) -> None:

@@ -1,0 +1,93 @@
+"""Our neural renderer: encoded buffers and scene vector to radiance, per pixel."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+
+from ngi.models.generator_inputs import check_inputs
+from ngi.models.known_light import add_known_light
+from ngi.models.pixel_encoding import PixelEncoding
+from ngi.models.pixel_generator import CACHED_PIXELS, MANY_PIXELS, RADIANCE_CHANNELS
+from ngi.models.pixel_mlp import PixelMLP
+from ngi.patches import BufferLayout
+
+
+class EncodedGenerator(nn.Module):
+    """The same function as the paper's `PixelGenerator`, cheaper per step and quicker to learn.
+
+    Every pixel is encoded (`PixelEncoding`). The first layer sees the encoded pixel and v, the one
+    half way sees the pixel again (`PixelMLP`); in the paper all layers but the first see both.
+    Emission and direct light are added to the output (`add_known_light`).
+
+    layout: the buffers of the scene
+    scene_dimensions: D, the length of v; may be 0
+    hidden_features, hidden_layers: width of the hidden layers and their number
+    octaves, directions: see `PixelEncoding`
+
+    Under autocast everything between the encoding and the output is in the lower precision.
+    """
+
+    def __init__(
+        self,
+        *,
+        layout: BufferLayout,
+        scene_dimensions: int,
+        hidden_features: int,
+        hidden_layers: int,
+        octaves: int,
+        directions: bool,
+    ) -> None:
+        super().__init__()
+        if hidden_features < 1 or hidden_layers < 1:
+            raise ValueError(
+                f"model.hidden_features is {hidden_features} and model.hidden_layers is "
+                f"{hidden_layers}: both must be at least 1"
+            )
+        self.layout = layout
+        self.scene_dimensions = scene_dimensions
+        self.encoding = PixelEncoding(layout=layout, octaves=octaves, directions=directions)
+        self.mlp = PixelMLP(
+            pixel_features=self.encoding.features,
+            patch_features=scene_dimensions,
+            hidden_features=hidden_features,
+            hidden_layers=hidden_layers,
+            out_features=RADIANCE_CHANNELS,
+        )
+
+    def forward(self, buffers: Tensor, scene_vector: Tensor) -> Tensor:
+        """log1p of linear RGB radiance, [n, H, W, 3], of the buffers' dtype.
+
+        buffers: [n, H, W, C], channels as the layout says
+        scene_vector: [n, D] in [0, 1]
+        Raises ValueError where these shapes do not fit.
+        """
+        check_inputs(
+            buffers, scene_vector, layout=self.layout, scene_dimensions=self.scene_dimensions
+        )
+        output = self._output(buffers.flatten(1, 2), scene_vector).unflatten(1, buffers.shape[1:3])
+        return add_known_light(output, buffers, self.layout)
+
+    @torch.no_grad()
+    def render(self, buffers: Tensor, scene_vector: Tensor) -> Tensor:
+        """A whole image, [H, W, C] and v [D] to log1p radiance [H, W, 3]; keeps no gradient."""
+        check_inputs(
+            buffers[None],
+            scene_vector[None],
+            layout=self.layout,
+            scene_dimensions=self.scene_dimensions,
+        )
+        size = CACHED_PIXELS if buffers.device.type == "cpu" else MANY_PIXELS
+        chunks = buffers.flatten(0, 1).split(size)
+        output = torch.cat([self._output(chunk[None], scene_vector[None])[0] for chunk in chunks])
+        return add_known_light(output.unflatten(0, buffers.shape[:2]), buffers, self.layout)
+
+    def _output(self, pixels: Tensor, scene_vector: Tensor) -> Tensor:
+        """Of the last layer: [n, p, C] and [n, D] to [n, p, 3]."""
+        device = pixels.device.type
+        precision = pixels.dtype
+        if torch.is_autocast_enabled(device) and precision == torch.float32:
+            precision = torch.get_autocast_dtype(device)
+        with torch.autocast(device, enabled=False):
+            output: Tensor = self.mlp(self.encoding(pixels, precision), scene_vector)
+        return output.to(pixels.dtype)

@@ -1,0 +1,23 @@
+"""What networks of buffers and scene vectors have to be given."""
+
+from __future__ import annotations
+
+from torch import Tensor
+
+from ngi.patches import BufferLayout
+
+
+def check_inputs(
+    buffers: Tensor, scene_vector: Tensor, *, layout: BufferLayout, scene_dimensions: int
+) -> None:
+    """ValueError where these are not buffers [n, H, W, C] and scene vectors [n, D]."""
+    if buffers.ndim != 4 or buffers.shape[-1] != layout.channels:
+        raise ValueError(
+            f"buffers of shape {list(buffers.shape)}: expected [n, H, W, "
+            f"{layout.channels}] for {list(layout.names)}"
+        )
+    if scene_vector.shape != (len(buffers), scene_dimensions):
+        raise ValueError(
+            f"scene vector of shape {list(scene_vector.shape)}: expected "
+            f"{[len(buffers), scene_dimensions]}"
+        )

@@ -1,0 +1,75 @@
+"""What a network is given of a pixel: the stored buffers, and what follows from them."""
+
+from __future__ import annotations
+
+import math
+
+import torch
+from torch import Tensor
+
+from ngi.models.image_layers import ALIGNMENT
+from ngi.patches import BufferLayout
+
+
+class PixelEncoding:
+    """Buffers, the position's sines and cosines, the reflected direction and the cosine n·ωo.
+
+    A small network learns low frequencies of its inputs first (Rahaman et al. 2019); sines and
+    cosines of the position give it higher ones (Tancik et al. 2020). What a glossy surface shows
+    depends on the reflected direction 2 (n·ωo) n − ωo rather than on n and ωo by themselves.
+    Nothing of it is stored: it is computed from the buffers.
+
+    layout: the buffers of the scene; emission is no input
+    octaves: sin and cos of 2^k π (p − 1/2) for k from 0 to octaves − 1, p being the position in
+        [0, 1]; 0 for none
+    directions: whether the reflected direction and the cosine are given
+    """
+
+    def __init__(self, *, layout: BufferLayout, octaves: int, directions: bool) -> None:
+        if octaves < 0:
+            raise ValueError(f"model.octaves is {octaves}: it cannot be negative")
+        needed = {"normal", "outgoing"} - set(layout.names)
+        if directions and needed:
+            raise ValueError(
+                f"model.directions is true, and the scene's buffers {list(layout.names)} lack "
+                f"{sorted(needed)}: set model.directions=false"
+            )
+        self._layout = layout
+        self._octaves = octaves
+        self._directions = directions
+
+    @property
+    def features(self) -> int:
+        """Numbers per pixel that the network is given."""
+        return self(torch.zeros(1, self._layout.channels), torch.float32).shape[-1]
+
+    def __call__(self, buffers: Tensor, precision: torch.dtype) -> Tensor:
+        """Buffers [..., C] in float32 to features [..., I] in `precision`.
+
+        Rounded to bfloat16 a position alone would move by up to 1/256 of the scene's box; the
+        sines and cosines are made before anything is rounded, and the highest of four octaves
+        tells 1/6000 of the box apart. The number of features is a multiple of 8.
+        """
+        position = 2 * buffers[..., self._layout.slice("position")] - 1
+        others = buffers[..., position.shape[-1] : self._layout.input_channels]
+        parts = [position, others, *self._waves(position)]
+        if self._directions:
+            normal = 2 * buffers[..., self._layout.slice("normal")] - 1
+            outgoing = buffers[..., self._layout.slice("outgoing")]
+            cosine = (normal * outgoing).sum(dim=-1, keepdim=True)
+            parts += [2 * cosine * normal - outgoing, cosine]
+        width = sum(part.shape[-1] for part in parts)
+        parts.append(position.new_zeros(*position.shape[:-1], -width % ALIGNMENT))
+        return torch.cat([part.to(precision) for part in parts], dim=-1)
+
+    def _waves(self, position: Tensor) -> list[Tensor]:
+        """Of a position in [-1, 1]; sin 2x = 2 sin x cos x, cos 2x = 1 − 2 sin²x."""
+        if self._octaves == 0:
+            return []
+        half_turn = math.pi / 2 * position
+        sine, cosine = torch.sin(half_turn), torch.cos(half_turn)
+        waves = [sine, cosine]
+        for _ in range(self._octaves - 1):
+            sine, cosine = 2 * sine * cosine, 1 - 2 * sine * sine
+            waves += [sine, cosine]
+        return waves

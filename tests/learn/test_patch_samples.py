@@ -1,0 +1,85 @@
+from dataclasses import dataclass
+
+import pytest
+import torch
+
+from ngi.denoise import DenoisedJob
+from ngi.learn import PatchSamples
+from ngi.patches import BufferLayout
+from ngi.render import AnalyticRenderer
+from ngi.render.protocol import Deferred
+
+from .moving_camera import SCENE_VARIABLES, MovingCamera
+
+
+@dataclass
+class Halving:
+    """A denoiser whose result is known."""
+
+    calls: int = 0
+
+    def __call__(self, radiance, albedo, normal) -> torch.Tensor:
+        self.calls += 1
+        assert radiance.shape == albedo.shape == normal.shape
+        return radiance / 2
+
+
+def states(renderer, count=3) -> torch.Tensor:
+    generator = torch.Generator().manual_seed(0)
+    return torch.rand(count, renderer.dimensions + 2, generator=generator)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.25, 1.0])
+def test_targets_are_the_mean_of_traced_and_denoised_radiance(share) -> None:
+    renderer = AnalyticRenderer(dimensions=3, patch_size=16)
+    denoiser = Halving()
+    samples = PatchSamples(renderer=renderer, denoiser=denoiser, traced_share=share)
+    plain = renderer.render_patches(states(renderer), resolution=64, seed=1)
+    job = samples.start_patches(states(renderer), resolution=64, seed=1)
+    assert denoiser.calls == 0  # work is done when it is asked for
+    assert job.done()
+    result = job.result()
+    assert job.result() is result
+    assert denoiser.calls == 3
+    expected = (share + (1 - share) / 2) * plain.log_radiance.expm1()
+    torch.testing.assert_close(result.log_radiance.expm1(), expected, atol=1e-6, rtol=1e-5)
+    assert torch.equal(result.buffers, plain.buffers)
+    assert result.paths == plain.paths
+
+
+def test_negative_radiance_of_a_denoiser_is_none() -> None:
+    renderer = AnalyticRenderer(dimensions=1, patch_size=16)
+    traced = renderer.render_patches(states(renderer), resolution=64, seed=1)
+    job = DenoisedJob(
+        Deferred(lambda: traced),
+        lambda radiance, *_: radiance - 100,
+        traced_share=0.0,
+        layout=BufferLayout(),
+    )
+    assert (job.result().log_radiance == 0).all()
+
+
+def test_a_share_that_is_none_is_named() -> None:
+    with pytest.raises(ValueError, match=r"data\.traced_share is 1\.5; expected 0 to 1"):
+        PatchSamples(renderer=AnalyticRenderer(dimensions=1, patch_size=16), traced_share=1.5)
+
+
+def test_what_only_places_the_camera_is_left_out() -> None:
+    renderer = MovingCamera(patch_size=16)
+    samples = PatchSamples(renderer=renderer, camera=False)
+    patches = samples.blank(2)
+    v = torch.rand(renderer.dimensions)
+    patches.scene_vector[1] = v
+    (buffers, seen), _ = samples.example(patches)
+    assert samples.dimensions == SCENE_VARIABLES + 2  # the sampler still draws all of them
+    assert samples.network_dimensions == SCENE_VARIABLES
+    assert torch.equal(seen[1], v[:SCENE_VARIABLES])
+    assert torch.equal(samples.test_inputs(v, resolution=64)[0], v[:SCENE_VARIABLES])
+    assert buffers is patches.buffers
+
+
+def test_the_paper_gives_all_of_v() -> None:
+    samples = PatchSamples(renderer=MovingCamera(patch_size=16))
+    v = torch.rand(SCENE_VARIABLES + 2)
+    assert samples.network_dimensions == SCENE_VARIABLES + 2
+    assert torch.equal(samples.test_inputs(v, resolution=64)[0], v)
