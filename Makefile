@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 SWEEPS := same_time preconditioning resolution target_function acceptance histogram dimensions specular chess cnsr anf denoising sampling
 BUDGET ?= small
 OPTIONS ?=
-.PHONY: help setup demo test report lint smoke benchmark doctor clean
+.PHONY: help setup demo test report docs lint smoke benchmark doctor clean
 
 help: ## list the commands
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 14
@@ -42,6 +42,15 @@ report: setup ## all sweeps at BUDGET=smoke|small|paper: runs what is missing, b
 	$(BIN)/python -m ngi.train -m +sweeps=$$sweep budget=$(BUDGET) budget.clock=model $(OPTIONS) \
 	|| failed=1; done; \
 	$(BIN)/python -m analysis.report outputs/$(BUDGET)-model-clock && exit $$failed
+
+docs: $(VENV)/.docs ## the documentation as a site in build/site, with warnings as errors
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
+	@echo "written to build/site/index.html"
+
+$(VENV)/.docs: $(VENV)/.complete
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt \
+		--editable '.[docs]'
+	@touch $@
 
 benchmark: setup ## speed as ratios, with the machine's own limits measured beside: 15 minutes
 	@$(BIN)/python -m ngi.benchmark

@@ -167,7 +167,7 @@ def _notes(runs: Sequence[Run]) -> list[str]:
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit status, 1 where there is nothing that can be reported."""
     parser = argparse.ArgumentParser(
-        prog="python -m analysis.report",
+        prog="ngi report",
         description="Compares every finished run below FOLDER: results.csv, .md and .tex (mean and "
         "95 % interval over seeds), error against run time (.png, .svg), comparison pictures of "
         "the hard frames, and index.html, which has everything, the verdicts on the paper's claims "

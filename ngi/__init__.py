@@ -2,7 +2,7 @@
 
 import os
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 # PyTorch's waiting threads must not burn the time of Dr.Jit's, which share the cores. OpenMP reads
 # this once, when it is loaded, hence here.

@@ -1,4 +1,4 @@
-"""Measures what the steps of runs cost, for `budget.clock=model`: `python -m ngi.costs --help`."""
+"""Measures what the steps of runs cost, for `budget.clock=model`: `ngi costs --help`."""
 
 from __future__ import annotations
 
@@ -166,7 +166,7 @@ def _main(config: DictConfig) -> None:
 
 
 def main() -> None:
-    """Entry point of `python -m ngi.costs` and `ngi-costs`."""
+    """Entry point of `ngi costs` and `python -m ngi.costs`."""
     register()
     folder = cache_folder() / "costs"
     places = (f"hydra.{mode}.dir={folder}" for mode in ("run", "sweep"))

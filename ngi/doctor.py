@@ -1,6 +1,6 @@
 """Says what this machine has for rendering and training, and how to get what is missing.
 
-`python -m ngi.doctor`. Exit status 0 when the program can run here, 1 when it can't.
+`ngi doctor`. Exit status 0 when the program can run here, 1 when it can't.
 """
 
 from __future__ import annotations
@@ -152,8 +152,8 @@ def report(findings: Sequence[Finding]) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point of `python -m ngi.doctor` and `ngi-doctor`."""
-    parser = argparse.ArgumentParser(prog="ngi.doctor", description=__doc__)
+    """Entry point of `ngi doctor` and `python -m ngi.doctor`."""
+    parser = argparse.ArgumentParser(prog="ngi doctor", description=__doc__)
     parser.parse_args(arguments)
     findings = [examine(check) for check in CHECKS]
     print(report(findings))

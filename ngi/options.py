@@ -50,9 +50,10 @@ def run_tool(
     program: str,
     arguments: Sequence[str] | None = None,
 ) -> int:
-    """Does what `python -m PROGRAM key=value …` asks for, and returns its exit status.
+    """Does what `PROGRAM key=value …` asks for, and returns its exit status.
 
-    kind: of the options, see `read_options`; arguments: those of the command line where None
+    kind: of the options, see `read_options`; program: `ngi VERB`, as messages call it
+    arguments: those of the command line where None
     0; 2 where `work` raised ValueError, OSError or RuntimeError, which is printed; Ctrl-C: 130.
     """
     options = read_options(kind, program, sys.argv[1:] if arguments is None else arguments)
@@ -75,7 +76,7 @@ def _help(kind: type, program: str) -> str:
     rows = [(_shown(entry), entry.metadata["help"]) for entry in fields(kind)]
     width = 2 + max(len(name) for name, _ in rows)
     lines = [f"  {name:{width}}{text}" for name, text in rows]
-    return "\n".join([f"python -m {program}\n", (kind.__doc__ or "").strip(), "", *lines])
+    return "\n".join([f"{program} key=value …\n", (kind.__doc__ or "").strip(), "", *lines])
 
 
 def _shown(entry: Field[Any]) -> str:

@@ -1,4 +1,4 @@
-"""Trains one run from a Hydra configuration: `python -m ngi.train --help`."""
+"""Trains one run from a Hydra configuration: `ngi train --help`."""
 
 from __future__ import annotations
 
@@ -216,7 +216,7 @@ def _main(config: DictConfig) -> None:
 
 
 def main() -> None:
-    """Entry point of `python -m ngi.train` and `ngi-train`."""
+    """Entry point of `ngi train` and `python -m ngi.train`."""
     register()
     _main()
 

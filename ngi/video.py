@@ -1,4 +1,4 @@
-"""A path through a scene as trained networks show it, as a video: `python -m ngi.video --help`."""
+"""A path through a scene as trained networks show it, as a video: `ngi video --help`."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
 class VideoOptions:
     """Films a path through a scene with a trained network, and measures how steady it is.
 
-    python -m ngi.video run=outputs/demo/sphere-caustic/method=uniform/seed=0 reference=64
-    python -m ngi.video run=FOLDER beside=OTHER path=hard_frames seconds=20
-    python -m ngi.video run=FOLDER path=static hard_frame=3 reference=64
+    ngi video run=outputs/demo/sphere-caustic/method=uniform/seed=0 reference=64
+    ngi video run=FOLDER beside=OTHER path=hard_frames seconds=20
+    ngi video run=FOLDER path=static hard_frame=3 reference=64
 
     Beside the MP4 file, a JSON file of the same name says what was measured: along a path that
     moves, the error of the changes from frame to frame (with a reference); where v stands still,
-    flicker. `python -m analysis.report` tabulates every video*.json below its folder.
+    flicker. `ngi report` tabulates every video*.json below its folder.
     """
 
     run: str = option("a run's folder, finished or not; of path tracing, finished")
@@ -179,8 +179,8 @@ def _table(film: Film, measured: Measured) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point of `python -m ngi.video`."""
-    return run_tool(write_video, VideoOptions, "ngi.video", arguments)
+    """Entry point of `ngi video`."""
+    return run_tool(write_video, VideoOptions, "ngi video", arguments)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The rooms of the house and what each may touch (README, Architecture)."""
+"""The rooms of the house and what each may touch (docs/explanation/method.md)."""
 
 import ast
 import subprocess

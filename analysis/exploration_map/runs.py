@@ -34,7 +34,7 @@ BASE = {
 """The point that single knobs are varied from.
 
 A batch of 16 patches costs 3 (sphere-caustic) to 17 (living-room) steps of 8 x 512 to render on
-two cores (README, Speed).
+two cores (docs/explanation/speed.md).
 """
 
 SETTING = [knob for knob in KNOBS if knob != "cost_ratio"]
@@ -56,7 +56,7 @@ SAMPLERS = {
 SCORING = {"loss": 0.35, "output_gradient": 0.4, "loss_step": 1.4}
 """What scoring 16 proposals and 16 current states costs, in training steps of 8 x 512 in bf16.
 
-Measured on two cores (README, Speed; loss alone by the same benchmark).
+Measured on two cores (docs/explanation/speed.md; loss alone by the same benchmark).
 """
 
 COST_RATIOS = (0.01, 0.1, 1.0, 10.0, 100.0)

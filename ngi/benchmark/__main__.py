@@ -1,4 +1,4 @@
-"""Entry point of `python -m ngi.benchmark` and `ngi-benchmark`.
+"""Entry point of `ngi benchmark` and `python -m ngi.benchmark`.
 
 The processes that parts start import this file: what they do not need is imported in functions.
 """
@@ -25,7 +25,7 @@ SHORT = ("living-room", "salon-25", "sphere-caustic")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point of `python -m ngi.benchmark` and `ngi-benchmark`."""
+    """Entry point of `ngi benchmark` and `python -m ngi.benchmark`."""
     from ngi.benchmark.parts import PARTS
 
     parser = _parser(PARTS)
@@ -86,7 +86,7 @@ def _write(figures: Sequence[Figure], output: Path) -> None:
 
 def _parser(parts: Sequence[Part]) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="ngi.benchmark",
+        prog="ngi benchmark",
         description=ngi.benchmark.__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="\n".join(["parts:", *(f"  {part.name:<14}{part.help}" for part in parts)]),

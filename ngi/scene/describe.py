@@ -1,4 +1,4 @@
-"""What varies, or could vary, in a scene: `python -m ngi.scene.describe SCENE`."""
+"""What varies, or could vary, in a scene: `ngi describe SCENE`."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def _geometry(scene: VariableScene) -> str:
 def main(arguments: list[str] | None = None) -> int:
     known = scenes()
     parser = argparse.ArgumentParser(
-        prog="python -m ngi.scene.describe",
+        prog="ngi describe",
         description="Describe a variable scene, check its camera, and say what a run leaves out; "
         "or list what could vary in a plain Mitsuba file and write a scene.yaml to start from.",
         epilog=f"Scenes known by name: {', '.join(sorted(known))}.",

@@ -1,11 +1,11 @@
-"""A contact sheet of every scene, to be looked at: `python -m ngi.scene.gallery`."""
+"""A contact sheet of every scene, to be looked at: `ngi gallery`."""
 
 from __future__ import annotations
 
 import argparse
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import torch
 from PIL import Image, ImageDraw
@@ -69,10 +69,8 @@ def _grid(tiles: list[tuple[str, Image.Image]], size: int) -> Image.Image:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    from ngi.render.mitsuba_renderer import MitsubaRenderer
-
     parser = argparse.ArgumentParser(
-        prog="python -m ngi.scene.gallery",
+        prog="ngi gallery",
         description="Make a contact sheet of every scene: random configurations, hard frames and "
         "buffers.",
     )
@@ -86,6 +84,17 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     if unknown := set(options.scenes) - set(known):
         parser.error(f"no scene {sorted(unknown)}; there are {sorted(known)}")
+    try:
+        _write_sheets(options, known)
+    except (ValueError, OSError, RuntimeError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def _write_sheets(options: argparse.Namespace, known: dict[str, dict[str, Any]]) -> None:
+    from ngi.render.mitsuba_renderer import MitsubaRenderer
+
     options.folder.mkdir(parents=True, exist_ok=True)
     for name in tqdm(options.scenes or sorted(known), desc="scenes"):
         renderer = MitsubaRenderer(scene=read_scene(**known[name]), backend=options.backend)
@@ -97,7 +106,6 @@ def main(arguments: list[str] | None = None) -> int:
         )
         picture.save(options.folder / f"{name}.jpg", quality=85)
         tqdm.write(f"{options.folder / f'{name}.jpg'}")
-    return 0
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Runs extreme and stiff cases and says what became of each: `python -m ngi.stability --help`."""
+"""Runs extreme and stiff cases and says what became of each: `ngi stability --help`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ngi.stability.case import Case, Row, attempt
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point of `python -m ngi.stability`; 1 where a case failed, 2 for a wrong command."""
+    """Entry point of `ngi stability`; 1 where a case failed, 2 for a wrong command."""
     from ngi.stability.groups import GROUPS
 
     parser = _parser(GROUPS)
@@ -73,7 +73,7 @@ def markdown(table: pd.DataFrame) -> str:
 
 def _parser(groups: Mapping[str, Sequence[Case]]) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="python -m ngi.stability",
+        prog="ngi stability",
         description="Runs extreme and stiff cases on every sampler, precision and backend at hand "
         "and says of each: whether all numbers are finite, the error against the ordinary case or "
         "a closed form, what was done about it (guard, clamp, resample, refuse), the verdict.",

@@ -1,4 +1,4 @@
-"""Shows a trained network in the browser: `python -m ngi.view --help`."""
+"""Shows a trained network in the browser: `ngi view --help`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ POLL = 0.5
 class ViewOptions:
     """Shows a trained network in the browser, with a slider for every variable of the scene.
 
-    python -m ngi.view run=outputs/demo/sphere-caustic/method=uniform/seed=0
+    ngi view run=outputs/demo/sphere-caustic/method=uniform/seed=0
 
     Over SSH: ssh -L 8080:127.0.0.1:8080 MACHINE, then open http://127.0.0.1:8080 here.
     """
@@ -68,8 +68,8 @@ def view(options: ViewOptions) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point of `python -m ngi.view`."""
-    return run_tool(view, ViewOptions, "ngi.view", arguments)
+    """Entry point of `ngi view`."""
+    return run_tool(view, ViewOptions, "ngi view", arguments)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""A trained network as one file for other programs: `python -m ngi.export --help`."""
+"""A trained network as one file for other programs: `ngi export --help`."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ RANDOM_PIXELS = 1000
 class ExportOptions:
     """Writes a trained network as an ONNX file, which runs without this program and PyTorch.
 
-    python -m ngi.export run=outputs/demo/sphere-caustic/method=uniform/seed=0
+    ngi export run=outputs/demo/sphere-caustic/method=uniform/seed=0
 
     Inputs: buffers [N, C] of any N pixels, and v [D] in [0, 1]. Output: radiance [N, 3], linear
     RGB, negative where the network says so. All in float32. The file's metadata says what each
@@ -106,5 +106,5 @@ def _inputs(run: TrainedRun) -> dict[str, tuple[Tensor, Tensor]]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point of `python -m ngi.export`."""
-    return run_tool(export, ExportOptions, "ngi.export", arguments)
+    """Entry point of `ngi export`."""
+    return run_tool(export, ExportOptions, "ngi export", arguments)

@@ -1,4 +1,4 @@
-"""One configuration of a scene as a trained network shows it: `python -m ngi.render --help`."""
+"""One configuration of a scene as a trained network shows it: `ngi render --help`."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ SUFFIXES = (".png", ".exr")
 class PictureOptions:
     """Renders one configuration of a scene with a trained network.
 
-    python -m ngi.render run=outputs/demo/sphere-caustic/method=uniform/seed=0 hard_frame=3
-    python -m ngi.render run=FOLDER v=[0.5,0.2,0.9] resolution=512 out=picture.exr
-    python -m ngi.render run=FOLDER reference=1024
+    ngi render run=outputs/demo/sphere-caustic/method=uniform/seed=0 hard_frame=3
+    ngi render run=FOLDER v=[0.5,0.2,0.9] resolution=512 out=picture.exr
+    ngi render run=FOLDER reference=1024
     """
 
     run: str = option("a run's folder, finished or not")
@@ -101,5 +101,5 @@ def _beside(path: Path, what: str) -> Path:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point of `python -m ngi.render`."""
-    return run_tool(write_picture, PictureOptions, "ngi.render", arguments)
+    """Entry point of `ngi render`."""
+    return run_tool(write_picture, PictureOptions, "ngi render", arguments)

@@ -17,7 +17,7 @@ FOLDERS = sorted(path.parent for path in SCENES.glob("*/scene.yaml"))
 ASSETS = (".ply", ".jpg", ".png", ".exr", ".hdr")
 MEGABYTE = 1_000_000
 
-DIMENSIONS = {  # the paper's, see the README
+DIMENSIONS = {  # the paper's, see docs/scenes.md
     "archviz": 71,
     "bathroom": 8,
     "bedroom": 6,

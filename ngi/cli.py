@@ -1,0 +1,85 @@
+"""One command for the whole program: `ngi VERB …`, or `python -m ngi VERB …`.
+
+A verb is a module with a function `main`, which is imported when its verb is asked for: `ngi
+--help` waits for neither PyTorch nor Mitsuba.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from importlib import import_module
+
+import ngi
+
+
+@dataclass(frozen=True)
+class Verb:
+    """A word of the command line. module: with `main()`, which reads sys.argv."""
+
+    name: str
+    module: str
+    help: str
+
+
+WAY = {
+    "First": (
+        Verb("doctor", "ngi.doctor", "what this machine has for rendering and training"),
+        Verb("train", "ngi.train", "train a network, or a sweep of runs; go on where it stopped"),
+        Verb("report", "analysis.report", "compare runs: tables, plots, verdicts on the claims"),
+    ),
+    "Look at a run": (
+        Verb("view", "ngi.view.__main__", "in the browser, with a slider for every variable"),
+        Verb("render", "ngi.render.__main__", "one picture of any configuration, as PNG or EXR"),
+        Verb("video", "ngi.video", "a path through the scene, and how steady the network is"),
+        Verb("export", "ngi.export", "the network as one ONNX file, for other programs"),
+    ),
+    "Scenes": (
+        Verb("describe", "ngi.scene.describe", "what varies in a scene, or could; what is wrong"),
+        Verb("gallery", "ngi.scene.gallery", "a contact sheet of every scene"),
+    ),
+    "Measure": (
+        Verb("costs", "ngi.costs", "what steps cost here, to count run time fairly when training"),
+        Verb("benchmark", "ngi.benchmark.__main__", "how fast every part of the program is"),
+        Verb("stability", "ngi.stability.__main__", "what becomes of extreme and stiff cases"),
+    ),
+}
+"""The verbs, in the order in which one meets them."""
+
+VERBS = {verb.name: verb for verbs in WAY.values() for verb in verbs}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point of `ngi` and `python -m ngi`; the verb's exit status, 2 where there is none.
+
+    arguments: those of the command line where None
+    """
+    name, *rest = [*(sys.argv[1:] if arguments is None else arguments)] or [""]
+    if name in ("-h", "--help"):
+        print(overview())
+        return 0
+    if name == "--version":
+        print(f"ngi {ngi.__version__}")
+        return 0
+    if name not in VERBS:
+        print(_unknown(name) if name else overview(), file=sys.stderr)
+        return 2
+    sys.argv = [f"ngi {name}", *rest]
+    status: int | None = import_module(VERBS[name].module).main()
+    return status or 0
+
+
+def overview() -> str:
+    """What `ngi --help` prints."""
+    lines = ["Neural global illumination of variable scenes.", ""]
+    lines += ["  ngi VERB …          does it", "  ngi VERB --help     says what it takes"]
+    for title, verbs in WAY.items():
+        lines += ["", f"{title}:", *(f"  {verb.name:<11}{verb.help}" for verb in verbs)]
+    return "\n".join(lines)
+
+
+def _unknown(name: str) -> str:
+    meant = get_close_matches(name, VERBS, n=1, cutoff=0.0)[0]
+    return f"ngi: there is no '{name}'; did you mean 'ngi {meant}'? ngi --help lists every verb"

@@ -1,0 +1,73 @@
+"""What the site is made of, and the pages beside it, which its strict build does not check."""
+
+import importlib.util
+import re
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+import yaml
+
+import ngi
+from ngi.cli import VERBS
+from tests.docs.pages import ROOT
+
+BESIDE = ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "scenes/LICENSE.md"]
+
+
+@pytest.fixture(scope="module")
+def documentation() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("hook", ROOT / "tools" / "documentation.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def headings(page: Path) -> set[str]:
+    """Anchors, as GitHub and MkDocs make them of plain titles."""
+    titles = re.findall(r"^#+ (.+)$", page.read_text(), flags=re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+@pytest.mark.parametrize("name", BESIDE)
+def test_links_lead_somewhere(name: str) -> None:
+    page = ROOT / name
+    for link in re.findall(r"\]\(([^)]+)\)", page.read_text()):
+        if link.startswith("https://"):
+            continue
+        target, _, anchor = link.partition("#")
+        file = page.parent / target
+        assert file.exists(), link
+        assert not anchor or anchor in headings(file), link
+
+
+def test_readme_stays_a_front_door() -> None:
+    assert len((ROOT / "README.md").read_text().splitlines()) <= 150
+
+
+def test_every_option_has_its_place_in_the_reference(documentation: ModuleType) -> None:
+    page = documentation.options()
+    for file in (ROOT / "conf").glob("*/*.yaml"):
+        if file.parent.name != "hydra":
+            assert f"### {file.parent.name}={file.stem}\n" in page
+    for file in (ROOT / "sweeps").glob("*.yaml"):
+        assert f"| `{file.stem}` |" in page
+
+
+def test_every_verb_has_its_place_in_the_reference(documentation: ModuleType) -> None:
+    page = documentation.commands()
+    for name, verb in VERBS.items():
+        assert f"| `ngi {name}` |" in page
+        module = verb.module.removesuffix(".__main__")
+        assert f"`python -m {module}`" in page
+        file = ROOT / module.replace(".", "/")
+        source = file / "__main__.py" if file.is_dir() else file.with_suffix(".py")
+        assert '__name__ == "__main__"' in source.read_text(), "python -m would do nothing"
+
+
+def test_the_citation_is_of_this_version() -> None:
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    assert citation["version"] == ngi.__version__
+    assert f"## [{ngi.__version__}]" in (ROOT / "CHANGELOG.md").read_text()

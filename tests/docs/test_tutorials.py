@@ -1,0 +1,61 @@
+"""The tutorials, as a reader follows them: from an empty folder, block by block."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.docs.pages import LONG, ROOT, blocks
+from tests.learn.command_line import environment
+
+TUTORIALS = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
+
+
+def reader(folder: Path) -> dict[str, str]:
+    """The environment of someone who has installed the program."""
+    programs = folder / "bin"
+    programs.mkdir()
+    ngi = programs / "ngi"
+    # PYTHONPATH=. of the tutorials replaces the checkout's path; `-m` looks where it is started.
+    ngi.write_text(
+        f'#!/bin/sh\nPYTHONPATH="$PYTHONPATH:{ROOT}" exec "{sys.executable}" -m ngi "$@"\n'
+    )
+    ngi.chmod(0o755)
+    known = environment(folder)
+    return {**known, "PATH": os.pathsep.join([str(programs), known["PATH"]])}
+
+
+def run(command: list[str], *, cwd: Path, env: dict[str, str]) -> None:
+    answer = subprocess.run(
+        command, cwd=cwd, env=env, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
+    assert answer.returncode == 0, f"{command[-1]}\n{answer.stdout}"
+
+
+def composed_only(text: str) -> str:
+    """Commands that train, each shown instead of run: the configuration of its first job."""
+    lines = [line for line in text.splitlines() if "ngi train" in line]
+    first = [re.sub(r"(?<==)([^ ,]+),\S+", r"\1", line.replace(" -m ", " ")) for line in lines]
+    return "\n".join(line.replace("ngi train", "ngi train --cfg job") for line in first)
+
+
+@pytest.mark.parametrize("page", TUTORIALS, ids=lambda page: page.stem)
+def test_a_tutorial_works_as_it_stands_there(page: Path, tmp_path: Path) -> None:
+    place, environment = tmp_path / "empty", reader(tmp_path)
+    place.mkdir()
+    script = ""
+    for block in blocks(page):
+        if block.is_file:
+            file = place / str(block.title)
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(block.text)
+        elif block.language == "sh":
+            text = composed_only(block.text) if block.title == LONG else block.text
+            run(["bash", "-e", "-c", text], cwd=place, env=environment)
+        elif block.language == "python":
+            script += block.text
+    if script:
+        run([sys.executable, "-c", script], cwd=place, env=environment)

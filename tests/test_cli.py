@@ -1,0 +1,102 @@
+"""`ngi VERB`: one way in, quick to answer, with errors that name the command."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import ngi
+from ngi.cli import VERBS, main
+
+ROOT = Path(__file__).parents[1]
+OF_HYDRA = ("train", "costs")
+
+
+def ngi_command(*arguments: str) -> "subprocess.CompletedProcess[str]":
+    return subprocess.run(
+        [sys.executable, "-m", "ngi", *arguments], capture_output=True, text=True, cwd=ROOT
+    )
+
+
+@pytest.fixture(autouse=True)
+def own_arguments(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "argv", ["pytest"])
+
+
+def test_help_shows_the_way(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--help"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    shown = [line.split()[0] for line in lines if line[:2] == "  " and line.split()[0] in VERBS]
+    assert shown == list(VERBS)
+    assert max(map(len, lines)) <= 80
+
+
+def test_help_and_a_wrong_verb_wait_for_nothing() -> None:
+    code = (
+        "import sys; from ngi.cli import main; main(['--help']); main(['tran'])\n"
+        "slow = ('torch', 'mitsuba', 'hydra', 'pandas', 'numpy')\n"
+        "print([name for name in slow if name in sys.modules])"
+    )
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT)
+    assert answer.stdout.splitlines()[-1] == "[]", answer.stderr
+
+
+def test_without_a_verb_the_way_is_shown_as_an_error(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([]) == 2
+    assert "ngi VERB --help" in capsys.readouterr().err
+
+
+def test_a_wrong_verb_names_the_nearest(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["trian", "scene=mirror"]) == 2
+    assert "no 'trian'; did you mean 'ngi train'?" in capsys.readouterr().err
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"ngi {ngi.__version__}\n"
+
+
+@pytest.mark.parametrize("verb", sorted(VERBS.keys() - {*OF_HYDRA}))
+def test_a_verb_shows_its_own_help(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stopped:
+        main([verb, "--help"])
+    assert stopped.value.code == 0
+    assert f"ngi {verb}" in capsys.readouterr().out.splitlines()[0]
+
+
+@pytest.mark.parametrize("verb", OF_HYDRA)
+def test_so_do_those_of_hydra(verb: str) -> None:
+    answer = ngi_command(verb, "--help")
+    assert answer.returncode == 0, answer.stderr
+    assert f"ngi {verb} -m +sweeps=" in answer.stdout
+    assert "== Groups" in answer.stdout
+
+
+@pytest.mark.parametrize("verb", ["view", "render", "video", "export"])
+def test_a_mistake_is_answered_by_the_command(
+    verb: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as stopped:
+        main([verb, "rnu=FOLDER"])
+    assert stopped.value.code == 2
+    assert f"ngi {verb}: 'rnu' is no option" in capsys.readouterr().err
+
+
+def test_a_verb_gets_its_arguments_and_gives_its_status(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    assert main(["report", str(tmp_path)]) == 1
+    assert str(tmp_path) in capsys.readouterr().err
+
+
+def test_training_takes_the_same_words() -> None:
+    answer = ngi_command("train", "--cfg", "job", "budget=smoke", "scene=mirror")
+    assert answer.returncode == 0, answer.stderr
+    assert "name: mirror" in answer.stdout
+
+
+def test_a_wrong_option_of_training_is_an_error() -> None:
+    answer = ngi_command("train", "sampler=no_such")
+    assert answer.returncode == 1
+    assert "Could not find 'sampler/no_such'" in answer.stderr
