@@ -10,17 +10,24 @@ from typing import Any
 
 import pandas as pd
 
+from analysis.records import read_records
+from analysis.run_checks import (
+    DISTINCTIONS,
+    METRICS,
+    SETS,
+    check_logs,
+    check_result,
+    read_table,
+)
+
+__all__ = ["DISTINCTIONS", "METRICS", "SETS", "Run", "check_comparable", "comparison_warnings"]
+__all__ += ["find_runs"]
+
 SCHEMA_VERSION = 1
 """Of the result files this program understands."""
 
-SETS = ("hard", "uniform")
-METRICS = ("mape", "dssim", "mae", "lpips")
-
 MOST_TIME_APART = 0.05
 """Relative difference of run times up to which runs count as given the same time."""
-
-DISTINCTIONS = ("reuse", "resolution", "model", "loss", "budget", "overrides", "experiment")
-"""Label fields that tell methods of one sampler apart, the most telling first."""
 
 
 @dataclass(frozen=True)
@@ -94,37 +101,23 @@ def _read(folder: Path) -> Run:
             "program's version that wrote it, or move the run out of the folder"
         )
     try:
-        history = pd.read_csv(folder / "metrics.csv")
-        if missing := {"step", "run_seconds"} - set(history.columns):
-            raise KeyError(*missing)
-    except (OSError, ValueError, KeyError) as error:
-        raise _SkippedRunError(f"metrics.csv cannot be read ({_describe(error)})") from error
-    run = Run(folder, result, history)
-    try:
-        _check_complete(run)
-    except (KeyError, TypeError) as error:
+        check_result(result)
+    except (KeyError, TypeError, AttributeError) as error:
         raise _SkippedRunError(f"result.json is incomplete ({_describe(error)})") from error
-    return run
+    try:
+        check_logs(folder, result)
+        history = read_table(folder / "metrics.csv")
+        if (folder / "steps.csv").exists():
+            read_table(folder / "steps.csv")
+        for name in ("chains.bin", "target_map.bin"):
+            read_records(folder / name)
+    except ValueError as error:
+        raise _SkippedRunError(str(error)) from error
+    return Run(folder, result, history)
 
 
 def _describe(error: Exception) -> str:
     return f"no {error}" if isinstance(error, KeyError) else str(error)
-
-
-def _check_complete(run: Run) -> None:
-    """Touches everything that is read later, so that what lacks is known before any output."""
-    result = run.result
-    for key in ("seed", "scene_hash", "reference_hash", "run_seconds", "steps"):
-        _ = result[key]
-    for key in ("patches_traced", "paths_traced", "frames"):
-        _ = result[key]
-    _ = result["protocol"]["name"], result["protocol"]["identity"]
-    for key in ("scene", "sampler", *DISTINCTIONS):
-        _ = run.label[key]
-    for set_name in SETS:
-        for metric in METRICS:
-            for statistic in ("mean", "worst5", "floor"):
-                run.metric(set_name, metric, statistic)
 
 
 def check_comparable(runs: Sequence[Run]) -> None:

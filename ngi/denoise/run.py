@@ -77,8 +77,7 @@ def run_path_tracing(
         "scene_hash": renderer.scene_hash,
         **evaluation.result(),
     }
-    folder.write_result(result)
-    return result
+    return folder.write_result(result)
 
 
 def _write(evaluation: Evaluation, *, folder: RunFolder, tracker: Tracker) -> None:

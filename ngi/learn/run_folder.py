@@ -61,8 +61,12 @@ class RunFolder:
         """Makes the folder this run's, once everything is built and training can start."""
         _write_json(self._settings, self.settings)
 
-    def write_result(self, result: dict[str, Any]) -> None:
-        _write_json(self._result, result)
+    def write_result(self, result: dict[str, Any]) -> dict[str, Any]:
+        """Writes and returns it, with the logs' lengths and checksums, by which damage is seen."""
+        logs = {log.path.name: log.fingerprint() for log in self.logs}
+        whole = {**result, "logs": {name: found for name, found in logs.items() if found}}
+        _write_json(self._result, whole)
+        return whole
 
     def close(self) -> None:
         """Writes the logs out and lets other processes use the folder."""
