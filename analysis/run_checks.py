@@ -88,9 +88,9 @@ def read_table(file: Path) -> pd.DataFrame:
         table = pd.read_csv(file)
     except (OSError, ValueError) as error:
         raise ValueError(f"{file.name} cannot be read ({error})") from error
-    for column in ("step", "run_seconds"):
-        if column not in table:
-            raise ValueError(f"{file.name} cannot be read (no column '{column}')")
+    for needed in ("step", "run_seconds"):
+        if needed not in table:
+            raise ValueError(f"{file.name} cannot be read (no column '{needed}')")
     if not len(table):
         raise ValueError(f"{file.name} has no row")
     for column, values in table.select_dtypes(exclude="number").items():
