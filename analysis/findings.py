@@ -10,7 +10,14 @@ import pandas as pd
 
 from analysis.claims import SALONS, SEVEN_SCENES
 from analysis.evidence import EQUIVALENCE, Finding, Verdict, decide
-from analysis.pairs import log_error, log_errors, log_ratios, pair_runs, shared_metrics
+from analysis.pairs import (
+    log_error,
+    log_errors,
+    log_ratios,
+    pair_runs,
+    runs_of_one_way,
+    shared_metrics,
+)
 from analysis.runs import Run
 from analysis.speedup import log_error_series
 from analysis.statistics import bootstrap_interval
@@ -48,10 +55,12 @@ def histogram_follows_target(runs: Sequence[Run]) -> list[Finding]:
     Mean of the last third of the run less that of the first third, per seed; of the chains alone,
     and beyond what uniform sampling shows while the target map changes.
     """
+    never = [run for run in runs if run.label["reuse"] == "never"]
+    methods = (METHOD, "metropolis", "uniform")
+    present = {run.label.get("method") for run in never if run.scene == "mirror"}
+    found = runs_of_one_way(never, "mirror", *(m for m in methods if m in present))
     without_reuse = [
-        replace(run, method=run.label["method"])
-        for run in runs
-        if run.scene == "mirror" and run.label["reuse"] == "never" and run.label.get("method")
+        replace(run, method=method) for method, by_seed in found.items() for run in by_seed.values()
     ]
     distances = histogram_distances(without_reuse)
     if distances.empty:
@@ -107,7 +116,8 @@ def many_variables_are_plausible(runs: Sequence[Run]) -> list[Finding]:
 
 
 def _runs_of(runs: Sequence[Run], scene: str) -> list[Run]:
-    return [r for r in runs if r.scene == scene and r.label.get("method") == METHOD]
+    """Exploration's, of one way, a run per seed."""
+    return list(runs_of_one_way(runs, scene, METHOD).get(METHOD, {}).values())
 
 
 def _log_errors(runs: Sequence[Run], metrics: Sequence[str]) -> np.ndarray:

@@ -23,6 +23,7 @@ from analysis.frame_times import frame_table
 from analysis.latex import to_latex
 from analysis.methods import differing_fields, methods_in_order, name_methods, title
 from analysis.page import PageContents, write_page
+from analysis.pairs import ways_left_out
 from analysis.pictures import write_comparisons
 from analysis.plots import method_styles, write_error_curves
 from analysis.provenance import provenance_frame
@@ -58,7 +59,7 @@ def write_report(folder: Path, output: Path) -> Report:
     runs, warnings = find_runs(folder)
     runs = name_methods(runs)
     check_comparable(runs)
-    doubts = comparison_warnings(runs)
+    doubts = comparison_warnings(runs) + ways_left_out(runs)
     summaries, styles = summarise(runs), method_styles(runs)
     comparisons, claims = compare(summaries), judge(runs)
     tables = [error_table(summaries), worst_table(summaries), cost_table(summaries)]
