@@ -92,9 +92,23 @@ def test_chess_is_compared_with_the_worst_scene_and_its_start(make_method, tmp_p
     assert start.verdict is Verdict.REPRODUCED
 
 
+def test_choosing_the_worst_scene_widens_the_interval(make_method, tmp_path) -> None:
+    for seed in range(3):
+        make_method("active_exploration", scene="chess", seed=seed, error=0.1, spread=0.3)
+        make_method("active_exploration", scene="veach-egg", seed=seed, error=0.2, spread=0.3)
+    alone, _ = many_variables_are_plausible(find_runs(tmp_path)[0])
+    for scene in ("bedroom", "bathroom"):
+        make_method("active_exploration", scene=scene, error=0.01)
+    chosen, _ = many_variables_are_plausible(find_runs(tmp_path)[0])
+    assert chosen.value == pytest.approx(alone.value)
+    assert chosen.low < alone.low < alone.high < chosen.high
+
+
 def test_chess_alone_is_compared_with_its_start_only(make_method, tmp_path) -> None:
     make_method("active_exploration", scene="chess")
-    (start,) = many_variables_are_plausible(find_runs(tmp_path)[0])
+    worst, start = many_variables_are_plausible(find_runs(tmp_path)[0])
+    assert math.isnan(worst.value)
+    assert worst.verdict is Verdict.INCONCLUSIVE
     assert "first evaluation" in start.text
     assert (start.low, start.verdict) == (None, Verdict.INCONCLUSIVE)
 
