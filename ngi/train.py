@@ -16,7 +16,7 @@ from omegaconf import DictConfig
 
 from ngi.build import build_module, build_samples, build_stream, plain, run_costs
 from ngi.config_values import check_values
-from ngi.configuration import register, run_settings
+from ngi.configuration import register, run_settings, scene_place
 from ngi.energy import EnergyMeter, energy_counters
 from ngi.memory import keep_freed_memory
 from ngi.resources import root
@@ -116,7 +116,7 @@ def _train(
         callbacks.append(_live_view(config, renderer, samples, module, stream, folder, clock))
     trainer = _trainer(config, budget, folder, callbacks)
     checkpoint = learn.prepare_resume(folder)
-    folder.begin()
+    folder.begin(scene_place=scene_place(config))
     recorder.prepare()
     renderer.warm_up()
     with interruption.deferred():

@@ -57,9 +57,14 @@ class RunFolder:
                 "the run again from its last checkpoint"
             ) from error
 
-    def begin(self) -> None:
-        """Makes the folder this run's, once everything is built and training can start."""
+    def begin(self, *, scene_place: dict[str, Any] | None = None) -> None:
+        """Makes the folder this run's, once everything is built and training can start.
+
+        scene_place: where the scene lies, kept in scene.json; no part of the identity
+        """
         _write_json(self._settings, self.settings)
+        if scene_place is not None:
+            _write_json(self.path / "scene.json", scene_place)
 
     def write_result(self, result: dict[str, Any]) -> dict[str, Any]:
         """Writes and returns it, with the logs' lengths and checksums, by which damage is seen."""

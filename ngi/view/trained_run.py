@@ -65,7 +65,7 @@ class TrainedRun:
                 f"{folder} has no network: path tracing took its place; ngi.video shows its frames"
             )
         checkpoint = _newest(folder)
-        description = describe_scene(settings, scene_path)
+        description = describe_scene(folder, settings, scene_path)
         renderer = make_renderer(folder, settings, description)
         samples = make_samples(settings, renderer)
         network = made_by(settings, "model")(
