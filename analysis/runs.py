@@ -150,7 +150,8 @@ def comparison_warnings(runs: Sequence[Run]) -> list[str]:
     """What makes a comparison doubtful without forbidding it, a line each.
 
     Trained runs of one scene whose run times are more than 5 % apart, runs of which some counted
-    measured costs instead of the wall clock's seconds, and runs of different machines.
+    measured costs instead of the wall clock's seconds, runs of different commits, of changed files,
+    and of different machines.
     """
     warnings = []
     for scene in sorted({run.scene for run in runs}):
@@ -164,7 +165,12 @@ def comparison_warnings(runs: Sequence[Run]) -> list[str]:
                 f"{scene}: the runs were not given the same time: {times[shortest]:.0f} s in "
                 f"{shortest}, {times[longest]:.0f} s in {longest}"
             )
+    if changed := [run.folder for run in runs if run.result.get("dirty")]:
+        warnings.append(
+            f"{len(changed)} run(s) were made with uncommitted changes, for example {changed[0]}"
+        )
     for what, value in (
+        ("were made with different commits", _commits),
         ("were timed by different clocks", _clock),
         ("come from different machines", _machine),
     ):
@@ -180,6 +186,12 @@ def comparison_warnings(runs: Sequence[Run]) -> list[str]:
 def _clock(run: Run) -> str:
     """'wall', or 'model' where run time was counted with measured costs per step."""
     return run.result.get("clock", "wall")
+
+
+def _commits(run: Run) -> str:
+    """Of all versions of the code that the run was made with, in order."""
+    versions = run.result.get("commits") or [{"commit": run.result.get("commit")}]
+    return " then ".join(dict.fromkeys(str(version["commit"])[:12] for version in versions))
 
 
 def _machine(run: Run) -> str:

@@ -19,6 +19,7 @@ from ngi.config_values import check_values
 from ngi.configuration import register, run_settings, scene_place
 from ngi.energy import EnergyMeter, energy_counters
 from ngi.memory import keep_freed_memory
+from ngi.provenance import code_commit
 from ngi.resources import root
 
 if TYPE_CHECKING:
@@ -81,6 +82,7 @@ def _train(
 ) -> dict[str, Any]:
     """closing: closes what is opened here"""
     from ngi import learn
+    from ngi.learn.code_versions import record_code_version
 
     clock = learn.PhaseClock(energy=EnergyMeter(energy_counters()))
     samples = build_samples(config, renderer=renderer)
@@ -125,6 +127,8 @@ def _train(
     trainer = _trainer(config, budget, folder, callbacks)
     checkpoint = learn.prepare_resume(folder)
     folder.begin(scene_place=scene_place(config))
+    commit, dirty = code_commit()
+    record_code_version(folder.path, commit=commit, dirty=dirty, after_step=folder.steps.last_step)
     recorder.prepare()
     renderer.warm_up()
     with interruption.deferred():

@@ -11,6 +11,7 @@ from typing import Any, TextIO
 
 from ngi.durable import write_atomically
 from ngi.learn import chain_trace, target_map
+from ngi.learn.code_versions import code_versions
 from ngi.learn.record_log import RecordLog
 from ngi.learn.row_log import RowLog
 
@@ -67,9 +68,17 @@ class RunFolder:
             _write_json(self.path / "scene.json", scene_place)
 
     def write_result(self, result: dict[str, Any]) -> dict[str, Any]:
-        """Writes and returns it, with the logs' lengths and checksums, by which damage is seen."""
+        """Writes and returns it, with what only the folder knows.
+
+        That is every version of the code that it was made with, and the logs' lengths and
+        checksums, by which damage is seen.
+        """
         logs = {log.path.name: log.fingerprint() for log in self.logs}
-        whole = {**result, "logs": {name: found for name, found in logs.items() if found}}
+        whole = {
+            **result,
+            "commits": code_versions(self.path),
+            "logs": {name: found for name, found in logs.items() if found},
+        }
         _write_json(self._result, whole)
         return whole
 

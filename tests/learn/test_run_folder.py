@@ -30,7 +30,7 @@ def test_another_run_is_refused_and_nothing_is_touched(tmp_path: Path) -> None:
         RunFolder(tmp_path, settings=changed)
     assert {p.name: p.read_bytes() for p in tmp_path.iterdir()} == before
     again = RunFolder(tmp_path, settings=SETTINGS)  # the refusal holds no lock
-    assert again.result == {"finished": True, "logs": {}}
+    assert again.result == {"finished": True, "commits": [], "logs": {}}
     again.close()
 
 
