@@ -1,4 +1,4 @@
-"""Every version of the code that a run was made with: no part of its identity, but of its record."""
+"""Every version of the code that made a run: no part of its identity, but of its record."""
 
 from __future__ import annotations
 
