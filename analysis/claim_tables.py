@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal
 
 from analysis.evidence import (
     ALL_SCENES,
@@ -26,7 +27,10 @@ _COLUMNS = ("difference", "g", "verdict", "time", "seeds", "seeds needed")
 
 @dataclass(frozen=True)
 class EvidenceLine:
-    """One line of evidence in words: what was compared or measured, and how it came out."""
+    """One line of evidence in words: what was compared or measured, and how it came out.
+
+    test: 'primary' where it alone can refute the claim, else 'further'.
+    """
 
     what: str
     difference: str
@@ -35,6 +39,7 @@ class EvidenceLine:
     time_ratio: str
     seeds: str
     seeds_needed: str
+    test: Literal["primary", "further"] = "further"
 
     @property
     def cells(self) -> tuple[str, ...]:
@@ -52,19 +57,25 @@ class EvidenceLine:
 def main_evidence(result: ClaimResult) -> list[EvidenceLine]:
     """What decides about a claim: findings, and per pair of methods all scenes or the only one.
 
-    Where nothing decides, what is shown beside.
+    The primary test comes first. Where nothing decides, what is shown beside.
     """
-    evidence: list[EvidenceLine] = []
+    findings: list[EvidenceLine] = []
     for finding in result.findings:
-        number = _with_interval(f"{finding.value:.3g}", finding.low, finding.high, "{:.3g}")
-        evidence.append(
+        value = MISSING if math.isnan(finding.value) else f"{finding.value:.3g}"
+        number = _with_interval(value, finding.low, finding.high, "{:.3g}")
+        findings.append(
             EvidenceLine(finding.text, number, MISSING, finding.verdict, MISSING, MISSING, MISSING)
         )
+    compared: list[EvidenceLine] = []
     pairs = dict.fromkeys((item.better, item.worse) for item in result.comparisons)
     for pair in pairs:
         of_pair = [item for item in result.comparisons if (item.better, item.worse) == pair]
         pooled = [item for item in of_pair if item.scene == ALL_SCENES]
-        evidence += [_of_comparison(item) for item in pooled or of_pair]
+        compared += [_of_comparison(item) for item in pooled or of_pair]
+    primary_finds = result.claim.primary == "finding"
+    evidence = [*findings, *compared] if primary_finds else [*compared, *findings]
+    if evidence and (findings if primary_finds else compared):
+        evidence[0] = replace(evidence[0], test="primary")
     deciding = [line for line in evidence if line.verdict != SHOWN_BESIDE]
     return deciding or evidence
 
@@ -90,13 +101,16 @@ def _verdict(item: ComparisonResult) -> str:
 
 
 def claims_table(results: Sequence[ClaimResult]) -> Table:
-    """Every claim that has runs, a row per line of its main evidence."""
+    """Every claim that has runs, a row per line of main evidence; the first has its verdict."""
     rows = tuple(
-        (Cell(result.claim.id), Cell(line.what), *map(Cell, line.cells))
+        tuple(map(Cell, (result.claim.id, line.test, line.what, *line.cells, verdict)))
         for result in results
-        for line in main_evidence(result)
+        for number, line in enumerate(main_evidence(result))
+        for verdict in [str(result.verdict) if number == 0 else ""]
     )
-    return Table("Claims of the paper", ("claim", "compared", *_COLUMNS), rows, 2)
+    return Table(
+        "Claims of the paper", ("claim", "test", "compared", *_COLUMNS, "of the claim"), rows, 3
+    )
 
 
 def effects_table(result: ClaimResult) -> Table:

@@ -109,11 +109,14 @@ def decide(low: float | None, high: float | None, *, equivalence: float = 0.0) -
     return Verdict.REPRODUCED if high < 0 else Verdict.INCONCLUSIVE
 
 
-def all_of(verdicts: Iterable[Verdict]) -> Verdict:
-    """Reproduced where each of them is, not reproduced where one is not, else inconclusive."""
-    found = list(verdicts)
-    if Verdict.NOT_REPRODUCED in found:
-        return Verdict.NOT_REPRODUCED
-    if found and all(verdict is Verdict.REPRODUCED for verdict in found):
-        return Verdict.REPRODUCED
-    return Verdict.INCONCLUSIVE
+def of_tests(primary: Verdict, further: Iterable[Verdict]) -> Verdict:
+    """A claim's verdict from its primary test, named beforehand, and the further ones.
+
+    Reproduced where every test is: each may err in 5 % of the cases, all together no more often.
+    Not reproduced where the primary one is not: were any of several allowed to refute, one would by
+    chance. Else inconclusive.
+    """
+    if primary is Verdict.REPRODUCED:
+        together = all(verdict is Verdict.REPRODUCED for verdict in further)
+        return Verdict.REPRODUCED if together else Verdict.INCONCLUSIVE
+    return primary

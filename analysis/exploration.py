@@ -29,7 +29,7 @@ COLUMNS = {
     "effective_targets": "effective targets",
     "reuse_probability": "reuse probability",
     "store_size": "stored patches",
-    "store_mean_age": "their mean age",
+    "store_mean_age": "their mean age in patches",
 }
 
 
@@ -41,7 +41,7 @@ def exploration_numbers(run: Run) -> dict[str, float] | None:
     effective_positions: effective sample size per 1,000 states of a chain, mean over chains and
         components of the position; effective_targets: that of the target density
     reuse_probability, store_size, store_mean_age: mean over the last tenth of the steps; the age
-        in steps
+        in patches that were stored since
     NaN stands for what a run does not have: small steps of uniform sampling, say.
     """
     trace = read_chain_trace(run)

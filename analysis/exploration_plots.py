@@ -31,7 +31,7 @@ PANELS = {
     "loss_new": "mean loss of new samples",
     "loss_existing": "mean loss of existing samples",
     "store_size": "stored patches",
-    "store_mean_age": "mean age of stored patches in steps",
+    "store_mean_age": "mean age of stored patches, in patches",
 }
 """Columns of steps.csv and their diagrams' titles."""
 
@@ -101,7 +101,8 @@ def _over_time(runs: Sequence[Run], styles: Styles) -> Figure:
     for axes in panels[:3]:
         axes.set_ylim(0, 1.03)
     panels[-1].set_title("states that live longer, every seed", fontsize=9, loc="left")
-    panels[-1].set(xlabel="proposals", xscale="log", yscale="log", ylim=(5e-3, 1.1))
+    # Limits first: where no state lasts, a logarithmic axis has nothing to be fitted to.
+    panels[-1].set(ylim=(5e-3, 1.1), xlabel="proposals", xscale="log", yscale="log")
     panels[-1].set_xlim(left=1)
     for axis in (panels[-1].xaxis, panels[-1].yaxis):
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))

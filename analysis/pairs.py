@@ -29,19 +29,44 @@ class Pair:
 def pair_runs(runs: Sequence[Run], scene: str, better: str, worse: str) -> list[Pair]:
     """The runs of a scene with these options of the group `method`, paired by seed, in order.
 
-    Where runs of the two methods were made in several ways (other overrides beside the method),
-    only the way with the fewest overrides that both have is taken.
+    Of runs made in several ways only one way counts, see `runs_of_one_way`.
+    """
+    found = runs_of_one_way(runs, scene, better, worse)
+    if not found:
+        return []
+    return pair_by_seed(found[better], found[worse])
+
+
+def runs_of_one_way(runs: Sequence[Run], scene: str, *methods: str) -> dict[str, dict[int, Run]]:
+    """By method and seed the runs of a scene, all made in one way; {} without one that all share.
+
+    A way is what was chosen beside the method. Runs of two ways are never mixed: what a further
+    override does is no difference between methods, and no scatter between seeds. Of the ways that
+    all these methods were run in, that with the fewest overrides counts, of several of these the
+    first in the alphabet; `ways_left_out` says which others there are.
     """
     by_way: dict[tuple[str, ...], dict[str, dict[int, Run]]] = {}
     for run in runs:
         method = run.label.get("method")
-        if run.scene == scene and method in (better, worse):
-            by_way.setdefault(_other_overrides(run), {}).setdefault(method, {})[run.seed] = run
-    shared = [way for way, methods in by_way.items() if len(methods) == 2]
-    if not shared:
-        return []
-    methods = by_way[min(shared, key=lambda way: (len(way), way))]
-    return pair_by_seed(methods[better], methods[worse])
+        if run.scene == scene and method in methods:
+            by_way.setdefault(_way(run), {}).setdefault(method, {})[run.seed] = run
+    shared = [way for way, found in by_way.items() if len(found) == len(set(methods))]
+    return by_way[min(shared, key=lambda way: (len(way), way))] if shared else {}
+
+
+def ways_left_out(runs: Sequence[Run]) -> list[str]:
+    """A line for every scene and method that was run in several ways, of which claims use one."""
+    ways: dict[tuple[str, str], set[tuple[str, ...]]] = {}
+    for run in runs:
+        if method := run.label.get("method"):
+            ways.setdefault((run.scene, method), set()).add(_way(run))
+    return [
+        f"{scene}: {method} was run in {len(found)} ways "
+        f"({'; '.join(' '.join(way) for way in sorted(found, key=lambda w: (len(w), w)))}); claims "
+        "are judged by runs of one way alone, that with the fewest overrides that the methods share"
+        for (scene, method), found in sorted(ways.items())
+        if len(found) > 1
+    ]
 
 
 def pair_by_seed(better: Mapping[int, Run], worse: Mapping[int, Run]) -> list[Pair]:
@@ -49,9 +74,12 @@ def pair_by_seed(better: Mapping[int, Run], worse: Mapping[int, Run]) -> list[Pa
     return [Pair(better[seed], worse[seed]) for seed in sorted(better.keys() & worse.keys())]
 
 
-def _other_overrides(run: Run) -> tuple[str, ...]:
-    overrides = run.label["overrides"].split(",")
-    return tuple(o for o in overrides if o != "default" and not o.startswith("method="))
+def _way(run: Run) -> tuple[str, ...]:
+    """Budget, experiment and overrides of a run, without its method."""
+    overrides = [o for o in run.label["overrides"].split(",") if not o.startswith("method=")]
+    chosen = [o for o in overrides if o and o != "default"]
+    budget, experiment = run.label["budget"], run.label["experiment"]
+    return (f"budget={budget}", f"experiment={experiment}", *chosen)
 
 
 def shared_metrics(runs: Sequence[Run], set_name: str) -> list[str]:

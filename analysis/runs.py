@@ -10,17 +10,24 @@ from typing import Any
 
 import pandas as pd
 
+from analysis.records import read_records
+from analysis.run_checks import (
+    DISTINCTIONS,
+    METRICS,
+    SETS,
+    check_logs,
+    check_result,
+    read_table,
+)
+
+__all__ = ["DISTINCTIONS", "METRICS", "SETS", "Run", "check_comparable", "comparison_warnings"]
+__all__ += ["find_runs"]
+
 SCHEMA_VERSION = 1
 """Of the result files this program understands."""
 
-SETS = ("hard", "uniform")
-METRICS = ("mape", "dssim", "mae", "lpips")
-
 MOST_TIME_APART = 0.05
 """Relative difference of run times up to which runs count as given the same time."""
-
-DISTINCTIONS = ("reuse", "resolution", "model", "loss", "budget", "overrides", "experiment")
-"""Label fields that tell methods of one sampler apart, the most telling first."""
 
 
 @dataclass(frozen=True)
@@ -94,37 +101,23 @@ def _read(folder: Path) -> Run:
             "program's version that wrote it, or move the run out of the folder"
         )
     try:
-        history = pd.read_csv(folder / "metrics.csv")
-        if missing := {"step", "run_seconds"} - set(history.columns):
-            raise KeyError(*missing)
-    except (OSError, ValueError, KeyError) as error:
-        raise _SkippedRunError(f"metrics.csv cannot be read ({_describe(error)})") from error
-    run = Run(folder, result, history)
-    try:
-        _check_complete(run)
-    except (KeyError, TypeError) as error:
+        check_result(result)
+    except (KeyError, TypeError, AttributeError) as error:
         raise _SkippedRunError(f"result.json is incomplete ({_describe(error)})") from error
-    return run
+    try:
+        check_logs(folder, result)
+        history = read_table(folder / "metrics.csv")
+        if (folder / "steps.csv").exists():
+            read_table(folder / "steps.csv")
+        for name in ("chains.bin", "target_map.bin"):
+            read_records(folder / name)
+    except ValueError as error:
+        raise _SkippedRunError(str(error)) from error
+    return Run(folder, result, history)
 
 
 def _describe(error: Exception) -> str:
     return f"no {error}" if isinstance(error, KeyError) else str(error)
-
-
-def _check_complete(run: Run) -> None:
-    """Touches everything that is read later, so that what lacks is known before any output."""
-    result = run.result
-    for key in ("seed", "scene_hash", "reference_hash", "run_seconds", "steps"):
-        _ = result[key]
-    for key in ("patches_traced", "paths_traced", "frames"):
-        _ = result[key]
-    _ = result["protocol"]["name"], result["protocol"]["identity"]
-    for key in ("scene", "sampler", *DISTINCTIONS):
-        _ = run.label[key]
-    for set_name in SETS:
-        for metric in METRICS:
-            for statistic in ("mean", "worst5", "floor"):
-                run.metric(set_name, metric, statistic)
 
 
 def check_comparable(runs: Sequence[Run]) -> None:
@@ -157,7 +150,8 @@ def comparison_warnings(runs: Sequence[Run]) -> list[str]:
     """What makes a comparison doubtful without forbidding it, a line each.
 
     Trained runs of one scene whose run times are more than 5 % apart, runs of which some counted
-    measured costs instead of the wall clock's seconds, and runs of different machines.
+    measured costs instead of the wall clock's seconds, runs of different commits, of changed files,
+    and of different machines.
     """
     warnings = []
     for scene in sorted({run.scene for run in runs}):
@@ -171,7 +165,12 @@ def comparison_warnings(runs: Sequence[Run]) -> list[str]:
                 f"{scene}: the runs were not given the same time: {times[shortest]:.0f} s in "
                 f"{shortest}, {times[longest]:.0f} s in {longest}"
             )
+    if changed := [run.folder for run in runs if run.result.get("dirty")]:
+        warnings.append(
+            f"{len(changed)} run(s) were made with uncommitted changes, for example {changed[0]}"
+        )
     for what, value in (
+        ("were made with different commits", _commits),
         ("were timed by different clocks", _clock),
         ("come from different machines", _machine),
     ):
@@ -187,6 +186,12 @@ def comparison_warnings(runs: Sequence[Run]) -> list[str]:
 def _clock(run: Run) -> str:
     """'wall', or 'model' where run time was counted with measured costs per step."""
     return run.result.get("clock", "wall")
+
+
+def _commits(run: Run) -> str:
+    """Of all versions of the code that the run was made with, in order."""
+    versions = run.result.get("commits") or [{"commit": run.result.get("commit")}]
+    return " then ".join(dict.fromkeys(str(version["commit"])[:12] for version in versions))
 
 
 def _machine(run: Run) -> str:

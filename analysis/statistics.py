@@ -55,10 +55,11 @@ def _relative_difference(baseline: float, other: float) -> float:
 
 
 def bootstrap_interval(
-    centre: float, levels: Sequence[np.ndarray], *, resamples: int = 4000
+    centre: float, levels: Sequence[np.ndarray], *, resamples: int = 4000, confidence: float = LEVEL
 ) -> tuple[float, float]:
-    """95 % interval of `centre`, a sum of means, by resampling each of `levels` with replacement.
+    """Interval of `centre`, a sum of means, by resampling each of `levels` with replacement.
 
+    confidence: 0.95 if nothing else is said
     levels: the values behind each mean, 1-D, two or more; what has two sources of chance at once,
     seeds and test frames, has the means per seed and the means per frame. They are resampled
     independently (the crossed, two-level bootstrap) and the deviations from the means add up.
@@ -86,7 +87,7 @@ def bootstrap_interval(
         n = len(values)
         means = values[generator.integers(n, size=(resamples, n))].mean(axis=1)
         deviations += math.sqrt(n / (n - 1)) * (means - values.mean())
-    tail = 0.5 - LEVEL / 2
+    tail = 0.5 - confidence / 2
     stretch = stats.t.ppf(tail, degrees) / stats.norm.ppf(tail)
     low, high = centre + stretch * np.quantile(deviations, [tail, 1 - tail])
     return float(low), float(high)

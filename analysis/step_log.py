@@ -7,16 +7,16 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
+from analysis.run_checks import read_table
 from analysis.runs import Run
 
 
 def read_steps(run: Run) -> pd.DataFrame:
     """A row per training step. Raises ValueError where steps.csv is missing or damaged."""
-    path = run.folder / "steps.csv"
     try:
-        return pd.read_csv(path)
-    except (OSError, ValueError) as error:
-        raise ValueError(f"{path} cannot be read ({error}); move the run away") from error
+        return read_table(run.folder / "steps.csv")
+    except ValueError as error:
+        raise ValueError(f"{run.folder}: {error}; move the run away") from error
 
 
 def mean_over_time(

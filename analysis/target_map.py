@@ -13,7 +13,8 @@ import numpy as np
 import pandas as pd
 from scipy.spatial.distance import jensenshannon
 
-from analysis.chain_trace import read_chain_trace, read_records
+from analysis.chain_trace import read_chain_trace
+from analysis.records import read_records
 from analysis.runs import Run
 
 SIMULATIONS = 200

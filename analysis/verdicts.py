@@ -15,7 +15,7 @@ from analysis.evidence import (
     Finding,
     TimeRatio,
     Verdict,
-    all_of,
+    of_tests,
 )
 from analysis.findings import FINDINGS
 from analysis.runs import Run
@@ -53,7 +53,8 @@ def judge(runs: Sequence[Run]) -> list[ClaimResult]:
     """Every claim of the paper, in the paper's order, with the evidence that these runs give.
 
     A claim is reproduced where every comparison and finding that decides it is; not reproduced
-    where one of them is not; else, or where one or one of its scenes is missing, inconclusive.
+    where its primary test is not (`Claim.primary`, named beforehand, so that none of several can be
+    picked afterwards); else, or where one or one of its scenes is missing, inconclusive.
     Each comparison is decided by one number chosen beforehand: the error ratio on the hard frames
     (the paper's measure), geometric mean over the metrics that all its runs have, so that no
     metric can be picked afterwards. Its 95 % interval over seeds and frames says how
@@ -66,14 +67,15 @@ def _judge(claim: Claim, runs: Sequence[Run]) -> ClaimResult:
     by_comparison = [_compare(comparison, runs) for comparison in claim.comparisons]
     comparisons = tuple(result for results in by_comparison for result in results)
     findings = tuple(FINDINGS[claim.id](runs)) if claim.id in FINDINGS else ()
-    deciding = [
+    tests = [
         _of_all_scenes(comparison, results)
         for comparison, results in zip(claim.comparisons, by_comparison, strict=True)
         if comparison.decides
     ]
     if claim.id in FINDINGS:
-        deciding += [finding.verdict for finding in findings] or [Verdict.INCONCLUSIVE]
-    verdict = all_of(deciding) if comparisons or findings else Verdict.NOT_RUN
+        found = [finding.verdict for finding in findings] or [Verdict.INCONCLUSIVE]
+        tests = [*found, *tests] if claim.primary == "finding" else [*tests, *found]
+    verdict = of_tests(tests[0], tests[1:]) if comparisons or findings else Verdict.NOT_RUN
     sentence = in_words(claim, verdict, by_comparison, findings)
     return ClaimResult(claim, comparisons, findings, verdict, sentence)
 

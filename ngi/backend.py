@@ -40,6 +40,11 @@ if _llvm is not None:
 import drjit as dr  # noqa: E402
 import mitsuba as mi  # noqa: E402
 
+if dr.thread_count() < 2:
+    # On one core Dr.Jit has no worker thread, and Mitsuba 3.9 waits for one for ever with every EXR
+    # file that it reads or writes (docs/upstream.md).
+    dr.set_thread_count(2)
+
 __all__ = ["VARIANTS", "activate", "cuda_problem", "describe", "dr", "llvm_problem", "mi"]
 
 VARIANTS = {"cuda": "cuda_ad_rgb", "llvm": "llvm_ad_rgb", "scalar": "scalar_rgb"}

@@ -56,6 +56,20 @@ def composed(*overrides: str) -> DictConfig:
         return hydra.compose("train", list(overrides))
 
 
+def scene_place(config: DictConfig) -> dict[str, Any] | None:
+    """What reads the scene, and from where, so that the run is found its scene again.
+
+    The reader's `_target_` and arguments, paths absolute; None for scenes of closed formulas.
+    """
+    if "scene" not in config.renderer:
+        return None
+    place = plain(config.scene.reader)
+    for key in ("folder", "path"):
+        if key in place:
+            place[key] = str(Path(place[key]).resolve())
+    return place
+
+
 def run_settings(config: DictConfig, *, scene_hash: str, costs: Costs | None) -> dict[str, Any]:
     """What decides the result. Scene and costs count by content, not by where they lie."""
     settings = plain(config)

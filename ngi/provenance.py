@@ -18,7 +18,7 @@ def provenance(*, backend: str) -> dict[str, Any]:
     """What every result file begins with. backend: the renderer's description."""
     import torch  # the doctor reads LIBRARIES where PyTorch may be missing
 
-    commit, dirty = _commit()
+    commit, dirty = code_commit()
     return {
         "schema_version": SCHEMA_VERSION,
         "commit": commit,
@@ -44,7 +44,7 @@ def _versions() -> dict[str, str | None]:
     return found
 
 
-def _commit() -> tuple[str | None, bool]:
+def code_commit() -> tuple[str | None, bool]:
     """The commit of this code and whether it was changed since; (None, False) outside git."""
     folder = Path(__file__).resolve().parent
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import logging
-import sys
 from collections.abc import Callable
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,15 +16,17 @@ from omegaconf import DictConfig
 
 from ngi.build import build_module, build_samples, build_stream, plain, run_costs
 from ngi.config_values import check_values
-from ngi.configuration import register, run_settings
+from ngi.configuration import register, run_settings, scene_place
 from ngi.energy import EnergyMeter, energy_counters
 from ngi.memory import keep_freed_memory
+from ngi.provenance import code_commit
 from ngi.resources import root
 
 if TYPE_CHECKING:
     from ngi import learn
     from ngi.learn.lightning_api import Callback, Trainer
     from ngi.render import Renderer
+    from ngi.view.live import LiveView
 
 log = logging.getLogger(__name__)
 
@@ -45,12 +47,15 @@ def train(config: DictConfig) -> dict[str, Any]:
     check_values(config)
     with learn.Interruption(of=config.run.folder) as interruption:
         budget = instantiate(config.budget)
-        renderer = instantiate(config.renderer)
-        costs = run_costs(config, budget=budget, renderer=renderer)
-        settings = run_settings(config, scene_hash=renderer.scene_hash, costs=costs)
-        folder = learn.RunFolder(Path(config.run.folder), settings=settings)
-        tracker = instantiate(config.tracker)
-        try:
+        with ExitStack() as stack:  # closes each that was made, whatever happens in the others
+            renderer = instantiate(config.renderer)
+            stack.callback(renderer.close)
+            costs = run_costs(config, budget=budget, renderer=renderer)
+            settings = run_settings(config, scene_hash=renderer.scene_hash, costs=costs)
+            folder = learn.RunFolder(Path(config.run.folder), settings=settings)
+            stack.callback(folder.close)
+            tracker = instantiate(config.tracker)
+            stack.push(partial(_finish, tracker))
             if folder.result is not None:
                 log.info("%s is finished already; delete the folder to run it again", folder.path)
                 return folder.result
@@ -58,12 +63,12 @@ def train(config: DictConfig) -> dict[str, Any]:
                 from ngi.denoise.run import run_path_tracing
 
                 return run_path_tracing(config, renderer=renderer, folder=folder, tracker=tracker)
-            return _train(config, budget, renderer, folder, tracker, interruption)
-        finally:
-            with ExitStack() as stack:  # closes each, whatever happens in the others
-                stack.callback(renderer.close)
-                stack.callback(folder.close)
-                stack.callback(tracker.finish, failed=sys.exc_info()[0] is not None)
+            return _train(config, budget, renderer, folder, tracker, interruption, stack)
+
+
+def _finish(tracker: learn.Tracker, failure: type[BaseException] | None, *_: object) -> None:
+    """As the end of a `with` block."""
+    tracker.finish(failed=failure is not None)
 
 
 def _train(
@@ -73,8 +78,11 @@ def _train(
     folder: learn.RunFolder,
     tracker: learn.Tracker,
     interruption: learn.Interruption,
+    closing: ExitStack,
 ) -> dict[str, Any]:
+    """closing: closes what is opened here"""
     from ngi import learn
+    from ngi.learn.code_versions import record_code_version
 
     schedule = instantiate(config.schedule)
     schedule.check(budget)
@@ -116,10 +124,14 @@ def _train(
     )
     module.rehearse(samples.blank(2))
     if config.viewer:
-        callbacks.append(_live_view(config, renderer, samples, module, stream, folder, clock))
+        view = _live_view(config, renderer, samples, module, stream, folder, clock)
+        closing.callback(view.close)
+        callbacks.append(view)
     trainer = _trainer(config, budget, folder, callbacks)
     checkpoint = learn.prepare_resume(folder)
-    folder.begin()
+    folder.begin(scene_place=scene_place(config))
+    commit, dirty = code_commit()
+    record_code_version(folder.path, commit=commit, dirty=dirty, after_step=folder.steps.last_step)
     recorder.prepare()
     renderer.warm_up()
     with interruption.deferred():
@@ -177,7 +189,7 @@ def _live_view(
     stream: learn.TrainingStream,
     folder: learn.RunFolder,
     clock: learn.PhaseClock,
-) -> Callback:
+) -> LiveView:
     """The run in the browser; RuntimeError where the libraries for it are not installed."""
     try:
         from ngi.view.live import live_view
@@ -203,10 +215,10 @@ def _main(config: DictConfig) -> None:
         result = train(config)
     except MESSAGES as error:
         # Hydra reports only the first failed job of a sweep: each says for itself what was wrong,
-        # in its own log too; the traceback is for those who ask for it.
+        # once, in its own log too; the traceback is for those who ask for it.
         log.error("%s", error)
         log.debug("traceback", exc_info=True)
-        raise CompactHydraException(str(error)) from error
+        raise CompactHydraException(f"{config.run.folder} failed: see above") from error
     hard = result["metrics"]["hard"]
     log.info(
         "%s: %s",

@@ -12,6 +12,7 @@ from omegaconf import DictConfig
 
 from ngi.benchmark.inference import show
 from ngi.build import plain
+from ngi.configuration import scene_place
 from ngi.denoise.frame_time import Frame, FrameTimes, largest_fitting
 from ngi.denoise.path_tracing import PathTracing, Plan
 from ngi.learn.clock import PAUSES, PHASES
@@ -48,7 +49,7 @@ def run_path_tracing(
     """
     plan = instantiate(config.path_tracing)
     label = {**plain(config.label), **dict.fromkeys(UNUSED, "none"), "seed": config.seed}
-    folder.begin()
+    folder.begin(scene_place=scene_place(config))
     tracker.start(folder=folder.path, settings=folder.settings, label=label)
     timed = _timed(config, plan, renderer)
     log.info("%s: %s", folder.path, timed)
@@ -77,8 +78,7 @@ def run_path_tracing(
         "scene_hash": renderer.scene_hash,
         **evaluation.result(),
     }
-    folder.write_result(result)
-    return result
+    return folder.write_result(result)
 
 
 def _write(evaluation: Evaluation, *, folder: RunFolder, tracker: Tracker) -> None:

@@ -72,7 +72,8 @@ def prepare_resume(folder: RunFolder) -> Path | None:
     if checkpoint is None:
         return None
     log.info(
-        "%s: going on from step %d; %d steps after it were lost and are done again",
+        "%s: going on from step %d, the last that was saved; later ones are done again (%d are in "
+        "steps.csv, a killed run may have done more)",
         folder.path,
         step,
         dropped[folder.steps],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 from pathlib import Path
 from typing import BinaryIO, Generic, TextIO, TypeVar
@@ -27,6 +28,15 @@ class GrowingFile(Generic[Stream]):
             with full_disk_named(self.path):
                 self._stream.flush()
                 os.fsync(self._stream.fileno())
+
+    def fingerprint(self) -> dict[str, int | str] | None:
+        """Length in bytes and SHA-256 of what is in the file, or None where there is none."""
+        self.flush()
+        if not self.path.exists():
+            return None
+        with self.path.open("rb") as stream:
+            digest = hashlib.file_digest(stream, "sha256").hexdigest()
+            return {"bytes": stream.tell(), "sha256": digest}
 
     def close(self) -> None:
         """The next `append` opens it again."""

@@ -119,5 +119,4 @@ class Recorder:
             "scene_hash": self._folder.settings["scene"]["hash"],
             **evaluation.result(),
         }
-        self._folder.write_result(result)
-        return result
+        return self._folder.write_result(result)

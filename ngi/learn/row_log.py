@@ -30,6 +30,14 @@ class RowLog(GrowingFile[TextIO]):
             assert self._writer is not None
             self._writer.writerow(row)
 
+    @property
+    def last_step(self) -> int:
+        """Of the last row that is on the disk, 0 where there is none."""
+        lines = self.path.read_text().splitlines() if self.path.exists() else []
+        if len(lines) < 2:
+            return 0
+        return int(next(csv.DictReader([lines[0], lines[-1]]))["step"])
+
     def keep_until(self, step: int) -> int:
         """Drops rows after `step` and returns how many.
 

@@ -12,6 +12,7 @@ from typing import Any, TextIO
 
 from ngi.durable import write_atomically
 from ngi.learn import chain_trace, target_map
+from ngi.learn.code_versions import code_versions
 from ngi.learn.record_log import RecordLog
 from ngi.learn.row_log import RowLog
 
@@ -63,14 +64,31 @@ class RunFolder:
                 "the run again from its last checkpoint"
             ) from error
 
-    def begin(self) -> None:
-        """Makes the folder this run's, once everything is built and training can start."""
+    def begin(self, *, scene_place: dict[str, Any] | None = None) -> None:
+        """Makes the folder this run's, once everything is built and training can start.
+
+        scene_place: where the scene lies, kept in scene.json; no part of the identity
+        """
         if self.lengthened:
             self._result.unlink(missing_ok=True)  # of the shorter run
         _write_json(self._settings, self.settings)
+        if scene_place is not None:
+            _write_json(self.path / "scene.json", scene_place)
 
-    def write_result(self, result: dict[str, Any]) -> None:
-        _write_json(self._result, result)
+    def write_result(self, result: dict[str, Any]) -> dict[str, Any]:
+        """Writes and returns it, with what only the folder knows.
+
+        That is every version of the code that it was made with, and the logs' lengths and
+        checksums, by which damage is seen.
+        """
+        logs = {log.path.name: log.fingerprint() for log in self.logs}
+        whole = {
+            **result,
+            "commits": code_versions(self.path),
+            "logs": {name: found for name, found in logs.items() if found},
+        }
+        _write_json(self._result, whole)
+        return whole
 
     def close(self) -> None:
         """Writes the logs out and lets other processes use the folder."""

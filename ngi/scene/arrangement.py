@@ -9,7 +9,6 @@ instance, so that its vertices are never rewritten.
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Sequence
 from xml.etree import ElementTree
 
@@ -37,7 +36,8 @@ def arranged(
     mesh that became an instance is the instance's.
     """
     moved = moving(variables)
-    root = copy.deepcopy(document.root)
+    copied = document.copied()
+    root = copied.root
     shapes = root.findall("shape")
     if not moved & {shape.get("id") for shape in shapes}:
         return document
@@ -65,7 +65,7 @@ def arranged(
             root.remove(shape)
             group.append(shape)
         _add_instance(root, STATIC, of=group)
-    return SceneFile(document.path, root)
+    return copied
 
 
 def moving(variables: Sequence[Variable]) -> set[str]:

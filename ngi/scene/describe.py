@@ -11,6 +11,7 @@ from ngi.backend import activate
 from ngi.scene.arrangement import STATIC
 from ngi.scene.clearance import camera_problems
 from ngi.scene.description import SceneDescription
+from ngi.scene.extent import meeting_views, out_of_bounds
 from ngi.scene.folder import read_scene, scenes
 from ngi.scene.loading import load
 from ngi.scene.scene_files import named_files, read_scene_file
@@ -48,7 +49,8 @@ def describe_scene(description: SceneDescription) -> tuple[str, list[str]]:
     if buffers_are_static(scene, needed_layout(needs)):
         lines.append("  no variable changes a buffer: they are rendered once per resolution")
     lines += ["", "geometry:", f"  {_geometry(scene)}"]
-    return "\n".join(lines), camera_problems(scene)
+    lines += [f"  note: {line}" for line in out_of_bounds(scene)]
+    return "\n".join(lines), meeting_views(description) or camera_problems(scene)
 
 
 def describe_file(path: Path) -> str:

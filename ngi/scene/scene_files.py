@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 import hashlib
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -24,11 +25,20 @@ class SceneFile:
 
     root: every file in it is named from the folder of `path`.
     included: names and paths of the XML files that it includes.
+    places: file and line where elements begin, as messages have them; not of those added since.
     """
 
     path: Path
     root: ElementTree.Element
     included: tuple[NamedFile, ...] = ()
+    places: dict[ElementTree.Element, str] = field(default_factory=dict, compare=False)
+
+    def copied(self) -> SceneFile:
+        """With a root of its own."""
+        root = copy.deepcopy(self.root)
+        pairs = zip(self.root.iter(), root.iter(), strict=True)
+        places = {new: self.places[old] for old, new in pairs if old in self.places}
+        return replace(self, root=root, places=places)
 
 
 def read_scene_file(path: Path, *, within: Path | None = None) -> SceneFile:
@@ -45,6 +55,7 @@ def read_scene_file(path: Path, *, within: Path | None = None) -> SceneFile:
     defaults: dict[str, str] = {}
     included: list[NamedFile] = []
     root, lines = read_xml(path, defaults)
+    places = element_places(path, lines)
     check_files(SceneFile(path, root), lines, within=within)
     while (place := _first_include(root)) is not None:
         parent, index = place
@@ -53,13 +64,19 @@ def read_scene_file(path: Path, *, within: Path | None = None) -> SceneFile:
             raise ValueError(f"{path}: <include> of '{name}': more than {MOST_INCLUDES}, or a loop")
         file = path.parent / name
         content, lines = read_xml(file, defaults)
+        places |= element_places(file, lines)
         for _, element, attribute in file_references(content):
             below = os.path.relpath(file.parent / element.get(attribute, ""), path.parent)
             element.set(attribute, below)
         check_files(SceneFile(file, content), lines, within=within, folder=path.parent)
         included.append((name, file))
         parent[index : index + 1] = list(content)
-    return SceneFile(path, root, tuple(included))
+    return SceneFile(path, root, tuple(included), places)
+
+
+def element_places(path: Path, lines: Lines) -> dict[ElementTree.Element, str]:
+    """`SceneFile.places` of one file's elements."""
+    return {element: f"{path}, line {line}" for element, line in lines.items()}
 
 
 def _first_include(root: ElementTree.Element) -> tuple[ElementTree.Element, int] | None:

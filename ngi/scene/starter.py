@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,7 +60,7 @@ def starter_yaml(document: SceneFile, scene: mi.Scene, found: list[Candidate]) -
     count = scene.sensors()[0].sampler().sample_count()
     lines = [
         "# What varies. Adjust the ranges, take the # away from what should vary, delete the rest.",
-        f"# Check it: ngi describe {folder_name}",
+        f"# Check it: ngi describe {shlex.quote(str(document.path.parent))}",
         f"name: {folder_name}",
         f"scene: {document.path.name}",
         f"samples_per_pixel: {count if count > 1 else 64}  # of training patches",

@@ -61,6 +61,13 @@ def read_xml(path: Path, defaults: dict[str, str] | None = None) -> tuple[Elemen
     return root, lines
 
 
+def shown(element: Element) -> str:
+    """The element as a message shows it, for example <shape type='ply' id='var_lamp'>."""
+    names = ("type", "id", "name", "value")
+    given = [f" {name}='{element.get(name)}'" for name in names if name in element.attrib]
+    return f"<{element.tag}{''.join(given)}>"
+
+
 def _replace_names(path: Path, root: Element, lines: Lines, defaults: dict[str, str]) -> None:
     """In document order: a <default> may be made of those before it."""
     for element in root.iter():

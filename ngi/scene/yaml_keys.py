@@ -44,7 +44,9 @@ class YamlKeys:
 
     def take(self, key: str, kind: type) -> Any:
         if key not in self.values:
-            raise ValueError(f"{self.path}: {self.prefix}{key} is missing; add it")
+            near = get_close_matches(key, map(str, self.values.keys() - self.taken), n=1)
+            advice = f", or is '{near[0]}' meant to be it?" if near else ""
+            raise ValueError(f"{self.path}: {self.prefix}{key} is missing; add it{advice}")
         self.taken.add(key)
         value = self.values[key]
         if not isinstance(value, kind) or (isinstance(value, bool) and kind is not object):

@@ -67,6 +67,7 @@ class LiveView(Callback):
         self._panel = TrainingPanel(page.gui, [*variables, "patch x", "patch y"])
         self._visited: deque[tuple[Tensor, Tensor]] = deque(maxlen=KEPT_BATCHES)
         self._free_from = self._refresh_from = 0.0
+        self._closed = False
 
     def on_train_batch_end(self, *_: Any) -> None:
         self._remember()
@@ -87,10 +88,13 @@ class LiveView(Callback):
         self._free_from = monotonic() + spent * (1 / SHARE - 1)
 
     def on_train_end(self, *_: Any) -> None:
-        self._page.close()
+        self.close()
 
-    def on_exception(self, *_: Any) -> None:
-        self._page.close()
+    def close(self) -> None:
+        """Frees the port; nothing happens the second time."""
+        if not self._closed:
+            self._closed = True
+            self._page.close()
 
     def _remember(self) -> None:
         record = self._stream.chain_record

@@ -8,6 +8,7 @@ import warnings
 
 import viser
 
+from ngi.view.server import fenced, viser_server
 from ngi.view.studio import Studio
 from ngi.view.subject import Subject
 from ngi.view.visitor import Visitor
@@ -29,7 +30,7 @@ class Page:
         self._studio = studio
         self._subject = subject
         self._resolution = resolution
-        self._server = viser.ViserServer(host=host, port=port, label=subject.name, verbose=False)
+        self._server = viser_server(host=host, port=port, label=subject.name)
         self._server.gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
         self._server.gui.main_panel.dock_right()
         self._server.on_client_connect(self._welcome)
@@ -58,8 +59,8 @@ class ErrorPage:
     """Says why there is nothing to see."""
 
     def __init__(self, message: str, *, host: str, port: int) -> None:
-        self._server = viser.ViserServer(host=host, port=port, verbose=False)
-        self._server.gui.add_markdown(f"**This run cannot be shown.**\n\n```\n{message}\n```")
+        self._server = viser_server(host=host, port=port)
+        self._server.gui.add_markdown(f"**This run cannot be shown.**\n\n{fenced(message)}")
         self.address = f"http://{host}:{self._server.get_port()}"
 
     def wait(self) -> None:

@@ -48,7 +48,7 @@ class PathTracedRun:
         if not (result := folder / "result.json").exists():
             raise FileNotFoundError(f"{result}: no such file; the run is not finished yet")
         denoiser = _denoiser(settings["path_tracing"]["denoiser"])
-        description = describe_scene(settings, scene_path)
+        description = describe_scene(folder, settings, scene_path)
         renderer = make_renderer(folder, settings, description)
         return cls(
             folder=folder,

@@ -17,6 +17,11 @@ from ngi.resources import root
 from ngi.scene import SceneDescription, read_scene, scenes
 from ngi.scene.release import read_release
 
+READERS: dict[str, Callable[..., SceneDescription]] = {
+    "ngi.scene.read_scene": read_scene,
+    "ngi.scene.release.read_release": read_release,
+}
+
 
 def read_settings(folder: Path) -> dict[str, Any]:
     """The run's settings.json; FileNotFoundError where there is none, ValueError if damaged."""
@@ -65,22 +70,43 @@ def plain(arguments: dict[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in arguments.items() if not name.startswith("_")}
 
 
-def describe_scene(settings: dict[str, Any], path: Path | None) -> SceneDescription | None:
+def describe_scene(
+    folder: Path, settings: dict[str, Any], path: Path | None
+) -> SceneDescription | None:
     """What varies in the run's scene; None where it is made of closed formulas.
 
-    path: of a scene in the authors' format; others are known by name, or ValueError is raised.
+    path: of a scene in the authors' format; None: where the run's folder says it was, or, where it
+        is not there any more, the scene of that name. ValueError where there is none either.
     """
     name = settings["scene"]["name"]
     if made_by(settings, "renderer") is not mitsuba_renderer:
         return None
     if path is not None:
         return read_release(path)
+    place = _remembered_place(folder)
+    if place is not None and Path(place.get("folder", place.get("path", ""))).exists():
+        return READERS[place["_target_"]](**plain(place))
     if name not in (known := scenes()):
+        gone = "" if place is None else f", nor at {place.get('folder', place.get('path'))}"
         raise ValueError(
-            f"scene '{name}' is not known here: name the folder above it in NGI_SCENES, or one of "
-            "the authors' scenes by scene=FOLDER"
+            f"scene '{name}' is not known here{gone}: name the folder above it in NGI_SCENES, or "
+            "one of the authors' scenes by scene=FOLDER"
         )
     return read_scene(**known[name])
+
+
+def _remembered_place(folder: Path) -> dict[str, Any] | None:
+    """What scene.json says; None for runs of before there was one. ValueError if damaged."""
+    path = folder / "scene.json"
+    if not path.exists():
+        return None
+    try:
+        place: dict[str, Any] = json.loads(path.read_text())
+        if place["_target_"] not in READERS:
+            raise ValueError(f"_target_ is {place['_target_']!r}, known are {list(READERS)}")
+    except (ValueError, KeyError, TypeError) as error:
+        raise ValueError(f"{path} is damaged ({error}); delete it") from error
+    return place
 
 
 def make_renderer(

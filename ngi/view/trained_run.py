@@ -67,7 +67,7 @@ class TrainedRun:
                 f"{folder} has no network: path tracing took its place; ngi.video shows its frames"
             )
         checkpoint = newest_checkpoint(folder)
-        description = describe_scene(settings, scene_path)
+        description = describe_scene(folder, settings, scene_path)
         renderer = make_renderer(folder, settings, description)
         samples = make_samples(settings, renderer)
         network = made_by(settings, "model")(

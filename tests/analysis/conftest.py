@@ -28,6 +28,10 @@ def final_error(set_name: str, metric: str, quality: float, seed: int) -> float:
     return difficulty * TYPICAL[metric] / quality * (1 + 0.1 * math.sin(7 * seed + quality))
 
 
+def final_step(seed: int) -> int:
+    return 1000 + 10 * seed
+
+
 def result_file(
     *, scene: str, sampler: str, seed: int, quality: float, label: dict[str, str], lpips: bool
 ) -> dict[str, Any]:
@@ -71,7 +75,7 @@ def result_file(
         "reference_hash": f"{scene}-references",
         "seconds": {"render": 100.0, "train": 120.0},
         "run_seconds": 240.0 + seed,
-        "steps": 1000 + 10 * seed,
+        "steps": final_step(seed),
         "patches_traced": 16000,
         "paths_traced": 524288000,
         "metrics": metrics,
@@ -96,7 +100,7 @@ def write_history(file: Path, *, seed: int, quality: float, lpips: bool) -> None
         writer = csv.DictWriter(stream, ["step", "run_seconds", "train_seconds", *keys])
         writer.writeheader()
         for step in range(9):
-            row: dict[str, Any] = {"step": 100 * step}
+            row: dict[str, Any] = {"step": final_step(seed) if step == 8 else 100 * step}
             row["run_seconds"] = 30.0 * step + seed
             row["train_seconds"] = 14.0 * step
             decay = 1 + 6 * math.exp(-step / 2)
@@ -211,7 +215,8 @@ def method_maker(make_run: MakeRun) -> MakeRun:
             writer.writerow(["step", "run_seconds", *keys])
             for step in range(9):
                 value = error * (1 + 7 * math.exp(-rate * 30 * step))
-                writer.writerow([100 * step, 30.0 * step, *[value] * len(keys)])
+                number = final_step(seed) if step == 8 else 100 * step
+                writer.writerow([number, 30.0 * step, *[value] * len(keys)])
         return folder
 
     return make

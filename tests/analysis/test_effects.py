@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 
 from analysis.effects import compare_on_scene, paired_effect, pool
-from analysis.evidence import ALL_SCENES, MORE_THAN_MOST_SEEDS, Verdict, all_of, decide
+from analysis.evidence import ALL_SCENES, MORE_THAN_MOST_SEEDS, Verdict, decide, of_tests
 from analysis.methods import name_methods
 from analysis.pairs import pair_runs
+from analysis.report import main
 from analysis.runs import METRICS, Run, find_runs
 
 
@@ -99,10 +100,12 @@ def test_verdict_is_read_from_the_interval(low, high, verdict) -> None:
 
 def test_a_claim_stands_with_all_of_its_evidence() -> None:
     yes, no, unclear = Verdict.REPRODUCED, Verdict.NOT_REPRODUCED, Verdict.INCONCLUSIVE
-    assert all_of([yes, yes]) is yes
-    assert all_of([yes, unclear]) is unclear
-    assert all_of([yes, unclear, no]) is no
-    assert all_of([]) is unclear
+    assert of_tests(yes, [yes]) is yes
+    assert of_tests(yes, []) is yes
+    assert of_tests(yes, [unclear]) is unclear
+    assert of_tests(yes, [no, yes]) is unclear  # one of several would refute by chance
+    assert of_tests(no, [yes]) is no
+    assert of_tests(unclear, [yes, no]) is unclear
 
 
 def test_one_seed_has_an_effect_and_no_interval(make_method, tmp_path) -> None:
@@ -198,3 +201,19 @@ def test_scenes_of_one_seed_each_decide_nothing_together(make_method, tmp_path) 
     assert pooled.decisive.effect_percent < -40
     assert (pooled.decisive.low, pooled.decisive.high) == (None, None)
     assert pooled.verdict is Verdict.INCONCLUSIVE
+
+
+def test_runs_of_two_experiments_are_not_paired(make_method, tmp_path) -> None:
+    make_method("active_exploration", error=0.05)
+    make_method("uniform", experiment="other")
+    assert pair_runs(find_runs(tmp_path)[0], "living-room", "active_exploration", "uniform") == []
+
+
+def test_ways_that_claims_leave_out_are_said(make_method, tmp_path, capsys) -> None:
+    for method in ("active_exploration", "uniform"):
+        make_method(method)
+        make_method(method, overrides="loss.l1_weight=2")
+    assert main([str(tmp_path)]) == 0
+    told = "living-room: uniform was run in 2 ways"
+    assert told in capsys.readouterr().err
+    assert told in (tmp_path / "report" / "results.md").read_text()

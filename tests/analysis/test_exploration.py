@@ -6,11 +6,13 @@ import pytest
 from PIL import Image
 
 from analysis.exploration import (
+    COLUMNS,
     exploration_numbers,
     exploration_table,
     histogram_distances,
     write_exploration_figures,
 )
+from analysis.exploration_plots import PANELS
 from analysis.methods import name_methods
 from analysis.plots import method_styles
 from analysis.runs import Run, find_runs
@@ -96,3 +98,9 @@ def test_columns_are_averaged_over_equal_times() -> None:
     seconds, values = mean_over_time([short, long], "x", points=2)
     np.testing.assert_array_equal(seconds, [1, 3])
     np.testing.assert_array_equal(values, [[2, np.nan], [0, 3]])
+
+
+def test_the_age_of_stored_patches_is_named_as_it_is_counted() -> None:
+    """`PatchStore.mean_age` counts patches that were added since, not steps."""
+    assert PANELS["store_mean_age"] == "mean age of stored patches, in patches"
+    assert COLUMNS["store_mean_age"] == "their mean age in patches"

@@ -14,6 +14,7 @@ from analysis.findings import (
     histogram_follows_target,
     many_variables_are_plausible,
 )
+from analysis.pairs import ways_left_out
 from analysis.runs import find_runs
 
 
@@ -91,9 +92,23 @@ def test_chess_is_compared_with_the_worst_scene_and_its_start(make_method, tmp_p
     assert start.verdict is Verdict.REPRODUCED
 
 
+def test_choosing_the_worst_scene_widens_the_interval(make_method, tmp_path) -> None:
+    for seed in range(3):
+        make_method("active_exploration", scene="chess", seed=seed, error=0.1, spread=0.3)
+        make_method("active_exploration", scene="veach-egg", seed=seed, error=0.2, spread=0.3)
+    alone, _ = many_variables_are_plausible(find_runs(tmp_path)[0])
+    for scene in ("bedroom", "bathroom"):
+        make_method("active_exploration", scene=scene, error=0.01)
+    chosen, _ = many_variables_are_plausible(find_runs(tmp_path)[0])
+    assert chosen.value == pytest.approx(alone.value)
+    assert chosen.low < alone.low < alone.high < chosen.high
+
+
 def test_chess_alone_is_compared_with_its_start_only(make_method, tmp_path) -> None:
     make_method("active_exploration", scene="chess")
-    (start,) = many_variables_are_plausible(find_runs(tmp_path)[0])
+    worst, start = many_variables_are_plausible(find_runs(tmp_path)[0])
+    assert math.isnan(worst.value)
+    assert worst.verdict is Verdict.INCONCLUSIVE
     assert "first evaluation" in start.text
     assert (start.low, start.verdict) == (None, Verdict.INCONCLUSIVE)
 
@@ -133,3 +148,32 @@ def test_distances_have_to_fall_by_more_than_uniforms(make_method, tmp_path, mon
 def test_runs_without_a_target_map_have_no_distances(make_method, tmp_path) -> None:
     make_method("active_exploration", scene="mirror", reuse="never")
     assert histogram_follows_target(find_runs(tmp_path)[0]) == []
+
+
+def test_a_run_with_a_further_override_is_no_further_seed(make_method, tmp_path) -> None:
+    for seed in range(2):
+        make_method("active_exploration", scene="bedroom", seed=seed)
+    make_method("active_exploration", scene="bedroom", seed=2, rate=0.2, overrides="loss.beta=2")
+    runs = find_runs(tmp_path)[0]
+    (finding,) = error_still_falls(runs)
+    assert finding == error_still_falls([run for run in runs if run.seed < 2])[0]
+    (line,) = ways_left_out(runs)
+    assert "bedroom: active_exploration was run in 2 ways" in line
+    assert "loss.beta=2" in line
+
+
+def test_maps_of_methods_run_in_several_ways_are_not_mixed(
+    make_method, tmp_path, monkeypatch
+) -> None:
+    for method in ("active_exploration", "uniform"):
+        make_method(method, scene="mirror", reuse="never")
+        make_method(method, scene="mirror", reuse="never", seed=1, overrides="loss.beta=2")
+    seen = []
+
+    def distances(runs) -> pd.DataFrame:  # type: ignore[no-untyped-def]
+        seen.extend((run.method, run.seed) for run in runs)
+        return pd.DataFrame()
+
+    monkeypatch.setattr(findings, "histogram_distances", distances)
+    assert histogram_follows_target(find_runs(tmp_path)[0]) == []
+    assert sorted(seen) == [("active_exploration", 0), ("uniform", 0)]

@@ -128,6 +128,17 @@ def test_two_clocks_in_one_comparison_are_a_doubt(make_run, tmp_path) -> None:
     assert f"different clocks: wall in {wall}; model in {model}" in warning
 
 
+def test_several_commits_and_changed_files_are_doubts(make_run, tmp_path) -> None:
+    make_run(seed=0, change=set_value("commit", value="a" * 40))
+    two = [{"commit": "a" * 40}, {"commit": "b" * 40}]
+    make_run(seed=1, change=set_value("commits", value=two))
+    changed = make_run(seed=2, change=set_value("dirty", value=True))
+    dirty, commits = comparison_warnings(find_runs(tmp_path)[0])
+    assert f"1 run(s) were made with uncommitted changes, for example {changed}" in dirty
+    assert "different commits: aaaaaaaaaaaa in" in commits
+    assert "aaaaaaaaaaaa then bbbbbbbbbbbb in" in commits
+
+
 def test_other_schema_version_is_refused(make_run, tmp_path) -> None:
     make_run()
     folder = make_run(seed=1, change=set_value("schema_version", value=2))

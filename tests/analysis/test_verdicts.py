@@ -3,6 +3,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from analysis.claim_tables import claims_table
 from analysis.claims import CLAIMS
 from analysis.methods import TITLES, name_methods
 from analysis.runs import find_runs
@@ -83,8 +84,23 @@ def test_every_part_of_a_claim_has_to_hold(make_method, tmp_path) -> None:
         ("uniform", "uniform_growing", Verdict.NOT_REPRODUCED, True),
         ("active_exploration", "uniform", Verdict.REPRODUCED, False),
     ]
-    assert result.verdict is Verdict.NOT_REPRODUCED
+    assert result.verdict is Verdict.INCONCLUSIVE
     assert "more error" in result.sentence
+
+
+def test_the_primary_test_alone_refutes(make_method, tmp_path) -> None:
+    errors = {"active_exploration": 0.07, "constant_resolution": 0.05, "uniform": 0.1}
+    for method, error in (errors | {"uniform_growing": 0.13}).items():
+        for seed in range(3):
+            make_method(method, seed=seed, error=error)
+    result = judged(tmp_path)["resolution"]
+    assert [c.verdict for c in result.comparisons[:2]] == [
+        Verdict.NOT_REPRODUCED,
+        Verdict.REPRODUCED,
+    ]
+    assert result.verdict is Verdict.NOT_REPRODUCED
+    lines = claims_table([result]).rows
+    assert [row[1].text for row in lines] == ["primary", "further"]
 
 
 def test_a_claim_with_both_parts(make_method, tmp_path) -> None:
@@ -118,7 +134,8 @@ def test_a_finding_decides_too(make_method, tmp_path) -> None:
         make_method("active_exploration", scene="bedroom", seed=seed, rate=0.2)
     result = judged(tmp_path)["specular"]
     assert result.comparisons[0].verdict is Verdict.REPRODUCED
-    assert result.verdict is Verdict.NOT_REPRODUCED
+    assert result.findings[0].verdict is Verdict.NOT_REPRODUCED
+    assert result.verdict is Verdict.INCONCLUSIVE
     assert "second half of the run" in result.sentence
 
 

@@ -46,6 +46,8 @@ def test_an_unwritable_folder_is_refused_before_anything_is_rendered(tmp_path: P
     assert status == 1
     assert f"run.folder=…, or see to its permissions: '{tmp_path / 'file' / 'run'}'" in output
     assert "Traceback" not in output
+    assert output.count("see to its permissions") == 1
+    assert "run failed: see above" in output
     assert not (tmp_path / "cache").exists()
 
 

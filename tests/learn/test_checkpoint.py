@@ -101,7 +101,7 @@ def test_a_run_with_a_damaged_file_ends_like_a_whole_one(
     (warning,) = [line for line in output.splitlines() if "the checkpoint before it" in line]
     assert str(file) in warning
     assert "damaged" in warning or "gone" in warning
-    assert "going on from step 42; 5 steps after it were lost and are done again" in output
+    assert "going on from step 42, the last that was saved; later ones are done again (5" in output
     assert_same_run(copy, finished / "run")
 
 

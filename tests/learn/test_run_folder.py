@@ -1,3 +1,4 @@
+import hashlib
 import json
 from pathlib import Path
 from typing import Any
@@ -29,7 +30,7 @@ def test_another_run_is_refused_and_nothing_is_touched(tmp_path: Path) -> None:
         RunFolder(tmp_path, settings=changed)
     assert {p.name: p.read_bytes() for p in tmp_path.iterdir()} == before
     again = RunFolder(tmp_path, settings=SETTINGS)  # the refusal holds no lock
-    assert again.result == {"finished": True}
+    assert again.result == {"finished": True, "commits": [], "logs": {}}
     again.close()
 
 
@@ -84,3 +85,17 @@ def test_damaged_settings_are_named(tmp_path: Path) -> None:
     (tmp_path / "settings.json").write_text("{")
     with pytest.raises(ValueError, match=r"settings\.json is damaged"):
         RunFolder(tmp_path, settings=SETTINGS)
+
+
+def test_the_result_holds_length_and_checksum_of_every_log(tmp_path: Path) -> None:
+    folder = RunFolder(tmp_path, settings=SETTINGS)
+    folder.steps.append({"step": 1, "loss": 0.5})
+    folder.chains.append({"step": 1})
+    written = folder.write_result({"finished": True})
+    assert folder.result == written
+    folder.close()
+    for name in ("steps.csv", "chains.bin"):
+        content = (tmp_path / name).read_bytes()
+        expected = {"bytes": len(content), "sha256": hashlib.sha256(content).hexdigest()}
+        assert written["logs"][name] == expected
+    assert written["logs"].keys() == {"steps.csv", "chains.bin"}

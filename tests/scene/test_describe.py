@@ -102,6 +102,21 @@ def test_a_camera_in_geometry_is_an_error(room, capsys) -> None:
     assert "error: at v = [0.0, 0.0, 0.0]: geometry reaches into" in capsys.readouterr().out
 
 
+def test_a_camera_that_can_look_nowhere_is_an_error(room, capsys) -> None:
+    folder = room(look_from("-1,0.8,0", "1,2,3"))
+    assert main([str(folder), "--backend", "scalar"]) == 1
+    text = capsys.readouterr().out
+    assert "camera.look_at: origin and target can meet, for example at [0.0, 1.0, 0.0]" in text
+
+
+def test_geometry_out_of_bounds_is_noted(room, capsys) -> None:
+    upwards = MOVE_BALL.replace("[0,1,2]", "[0,9,2]").replace("minimum: [0,0", "minimum: [0,0.5")
+    assert main([str(room(FREE, upwards)), "--backend", "scalar"]) == 1  # it meets the camera
+    text = capsys.readouterr().out
+    assert "note: 'ball' reaches 5.5 out of bounds" in text
+    assert text.count("note:") == 1
+
+
 def test_a_plain_file_becomes_a_variable_scene(room, capsys) -> None:
     folder = room(FREE)
     (folder / "scene.yaml").unlink()

@@ -1,5 +1,8 @@
 """Emitters, BSDFs and cameras of the tagged format: their values at some v."""
 
+import logging
+import re
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -202,3 +205,32 @@ def test_camera_looks_into_the_middle_third_at_a_third_of_the_height(tmp_path) -
         expected = mi.ScalarTransform4f().look_at(origin, target, [0, 1, 0]).matrix
         matrix = loaded.matrix("var_camera.to_world", 0.5, *u)
         assert_allclose(matrix, np.array(expected), atol=1e-5)
+
+
+SPHERE = '<shape type="sphere" id="var_ball">{}</shape>'
+
+
+@pytest.mark.parametrize(
+    ("body", "says"),
+    [
+        (
+            SPHERE.format(tags(3, "0, 0, 0", "1.2, -1, 0.3", axis="0, 1, 0")),
+            "does not move along that axis, and a component too many turns it",
+        ),
+        (
+            WALL.format(
+                "roughconductor", tags(1, "0, 0, 0, 0.01", "0, 0, 0, -0.009", kind="vector4f")
+            ),
+            "the value falls from min_bounds",
+        ),
+    ],
+)
+def test_a_negative_range_is_warned_of(tmp_path, caplog, body: str, says: str) -> None:
+    with caplog.at_level(logging.WARNING):
+        read(tmp_path, body + ROOM)
+    (message,) = [record.getMessage() for record in caplog.records]
+    place = (
+        rf"{tmp_path}/scene\.xml, line \d+: <(shape|bsdf) type='\w+' id='var_\w+'>: range_bounds"
+    )
+    assert re.match(place, message)
+    assert says in message

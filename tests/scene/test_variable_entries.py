@@ -68,6 +68,12 @@ def test_right_entries_are_read(tmp_path, kind) -> None:
     assert variable.objects == ("a",)
 
 
+def test_a_key_that_is_nearly_the_missing_one_is_named(tmp_path) -> None:
+    message = r"variables\[0\].keys is missing; add it, or is 'key' meant to be it\?"
+    with pytest.raises(ValueError, match=message):
+        read_scene(folder_with(tmp_path, entry("camera_path", "key: [[0,0,0, 1,1,1]]")))
+
+
 @pytest.mark.parametrize("kind", RIGHT)
 def test_unknown_keys_and_wrong_objects(tmp_path, kind) -> None:
     for i, (text, message) in enumerate(

@@ -8,8 +8,8 @@ from math import isfinite
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
-from ngi.scene.scene_files import SceneFile, check_files
-from ngi.scene.xml_file import Lines, read_xml
+from ngi.scene.scene_files import SceneFile, check_files, element_places
+from ngi.scene.xml_file import Lines, read_xml, shown
 from ngi.scene.yaml_keys import Vector
 
 
@@ -24,10 +24,13 @@ class Source:
     def root(self) -> Element:
         return self.document.root
 
+    def place(self, element: Element) -> str:
+        """File and line."""
+        return f"{self.document.path}, line {self.lines.get(element, '?')}"
+
     def error(self, element: Element, message: str) -> ValueError:
         """A ValueError that names the file, the line and the element."""
-        place = f"{self.document.path}, line {self.lines.get(element, '?')}"
-        return ValueError(f"{place}: {shown(element)}: {message}")
+        return ValueError(f"{self.place(element)}: {shown(element)}: {message}")
 
     def numbers(self, element: Element, attribute: str = "value") -> Vector:
         """The numbers of an attribute, with commas or spaces between them."""
@@ -71,16 +74,9 @@ def read_source(path: Path) -> Source:
     if not path.is_file():
         raise FileNotFoundError(f"{path}: no such scene file; scene.path names its folder or it")
     root, lines = read_xml(path)
-    source = Source(SceneFile(path, root), lines)
+    source = Source(SceneFile(path, root, places=element_places(path, lines)), lines)
     _check(source)
     return source
-
-
-def shown(element: Element) -> str:
-    """The element as a message shows it, for example <shape type='ply' id='var_lamp'>."""
-    names = ("type", "id", "name", "value")
-    given = [f" {name}='{element.get(name)}'" for name in names if name in element.attrib]
-    return f"<{element.tag}{''.join(given)}>"
 
 
 def _check(source: Source) -> None:

@@ -105,17 +105,35 @@ def _tags(source: Source, element: Element) -> Tags:
         count = source.integer(taken["num_parameters"])
     elif element.get("type") == "envmap":
         count = 1
+    extent = _bounds(source, taken.get("range_bounds"), 1.0)
+    if min(extent) < 0:
+        _warn_of_negative(source, element, taken["range_bounds"])
     axis = source.vector(taken["rotation_axis"]) if "rotation_axis" in taken else (1.0, 1.0, 1.0)
     if not any(axis):
         raise source.error(taken["rotation_axis"], "give a direction, such as 0, 1, 0")
     return Tags(
         count=count,
         minimum=_bounds(source, taken.get("min_bounds"), 0.0),
-        extent=_bounds(source, taken.get("range_bounds"), 1.0),
+        extent=extent,
         axis=axis,
         min_angle=number("min_angle", 0.0),
         range_angle=number("range_angle", 360.0),
         given=frozenset(taken),
+    )
+
+
+def _warn_of_negative(source: Source, element: Element, tag: Element) -> None:
+    if class_of(element) == "shape":
+        meaning = "a shape does not move along that axis, and a component too many turns it"
+    else:
+        meaning = "the value falls from min_bounds, where v is 0, to the smaller one, where v is 1"
+    _logger.warning(
+        "%s: %s: range_bounds is '%s', with a negative number: %s; write minimum and positive "
+        "range where that is not meant",
+        source.place(tag),
+        shown(element),
+        tag.get("value", ""),
+        meaning,
     )
 
 

@@ -1,0 +1,74 @@
+"""The table of claims in docs/results.md, from the tables that the report has written.
+
+`python -m analysis.readme_table RESULTS.md PAGE.md` writes it between two markers of the page.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from analysis.claims import CLAIMS
+from analysis.evidence import Verdict
+
+BEGIN, END = "<!-- claims: written by analysis.readme_table -->", "<!-- end of claims -->"
+
+HEADING = "**Claims of the paper**"
+
+
+def claim_lines(results: str) -> list[dict[str, str]]:
+    """Rows of the report's table of claims, by the table's columns.
+
+    results: content of results.md. Raises ValueError where it has no such table.
+    """
+    _, found, rest = results.partition(HEADING)
+    if not found:
+        raise ValueError(f"there is no table '{HEADING}': write the report again")
+    lines = [line for line in rest.split("\n\n")[1].splitlines() if line.startswith("|")]
+    rows = [[cell.strip().replace("\\", "") for cell in line.split("|")[1:-1]] for line in lines]
+    return [dict(zip(rows[0], row, strict=True)) for row in rows[2:]]
+
+
+def readme_table(results: str) -> str:
+    """A row per claim that has runs: the first line of its evidence, and the verdict on all."""
+    titles = {claim.id: claim.title for claim in CLAIMS}
+    rows = [
+        "| claim of the paper | primary test | difference (95 %) | verdict |",
+        "|:--|:--|--:|:--|",
+    ]
+    for line in claim_lines(results):
+        if not (verdict := line["of the claim"]):
+            continue
+        shown = verdict if verdict == Verdict.INCONCLUSIVE else f"**{verdict}**"
+        cells = (titles[line["claim"]], line["compared"], line["difference"], shown)
+        rows.append(f"| {' | '.join(cells)} |")
+    return "\n".join(rows)
+
+
+def with_table(readme: str, table: str) -> str:
+    """The page with this table. Raises ValueError where the markers are missing."""
+    pattern = re.compile(f"{re.escape(BEGIN)}.*?{re.escape(END)}", re.DOTALL)
+    if not pattern.search(readme):
+        raise ValueError(f"page: put the lines '{BEGIN}' and '{END}' where the table belongs")
+    return pattern.sub(lambda _: f"{BEGIN}\n\n{table}\n\n{END}", readme)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry point; returns the exit status."""
+    arguments = sys.argv[1:] if argv is None else argv
+    if len(arguments) != 2:
+        print(__doc__, file=sys.stderr)
+        return 2
+    results, readme = map(Path, arguments)
+    try:
+        readme.write_text(with_table(readme.read_text(), readme_table(results.read_text())))
+    except (OSError, ValueError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

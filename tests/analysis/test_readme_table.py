@@ -1,0 +1,63 @@
+"""docs/results.md, docs/small and the program's rules say the same about the claims."""
+
+import re
+from itertools import groupby
+from pathlib import Path
+
+import pytest
+
+from analysis.claim_tables import claims_table
+from analysis.evidence import Verdict, of_tests
+from analysis.methods import name_methods
+from analysis.readme_table import BEGIN, END, claim_lines, main, readme_table, with_table
+from analysis.runs import find_runs
+from analysis.tables import to_markdown
+from analysis.verdicts import judge
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def test_the_page_of_results_has_the_numbers_and_verdicts_of_docs_small() -> None:
+    page = (ROOT / "docs" / "results.md").read_text()
+    results = (ROOT / "docs" / "small" / "results.md").read_text()
+    assert page == with_table(page, readme_table(results)), (
+        "python -m analysis.readme_table docs/small/results.md docs/results.md writes it"
+    )
+
+
+def test_the_verdicts_of_docs_small_follow_from_its_tests() -> None:
+    lines = claim_lines((ROOT / "docs" / "small" / "results.md").read_text())
+    for claim, grouped in groupby(lines, lambda line: line["claim"]):
+        primary, *further = list(grouped)
+        verdict = of_tests(Verdict(primary["verdict"]), [Verdict(f["verdict"]) for f in further])
+        assert primary["test"] == "primary", claim
+        assert primary["of the claim"] == verdict, claim
+        assert {(line["test"], line["of the claim"]) for line in further} <= {("further", "")}
+
+
+def test_verdicts_are_those_of_the_judge(make_method, tmp_path) -> None:
+    for seed in range(3):
+        make_method("active_exploration", scene="living-room", seed=seed, error=0.05)
+        make_method("constant_resolution", scene="living-room", seed=seed)
+        make_method("uniform", scene="living-room", seed=seed)
+        make_method("uniform_growing", scene="living-room", seed=seed, error=0.05)
+        make_method("no_preconditioning", scene="living-room", seed=seed)
+        make_method("active_exploration", scene="chess", seed=seed, error=0.04)
+    claims = judge(name_methods(find_runs(tmp_path)[0]))
+    table = readme_table(f"intro\n\n{to_markdown(claims_table(claims))}\n\n**next**")
+    judged = {c.claim.title: str(c.verdict) for c in claims if c.verdict != "not run"}
+    rows = [[cell.strip() for cell in row.split("|")[1:-1]] for row in table.splitlines()[2:]]
+    assert {row[0]: row[3].strip("*") for row in rows} == judged
+    assert set(judged.values()) == {"reproduced", "inconclusive"}
+    assert all(re.match(r"[+-]?\d|–", row[2]) for row in rows)
+
+
+def test_what_is_missing_is_said(tmp_path, capsys) -> None:
+    with pytest.raises(ValueError, match="no table"):
+        readme_table("nothing")
+    with pytest.raises(ValueError, match="put the lines"):
+        with_table("nothing", "")
+    assert with_table(f"a {BEGIN} old {END} b", "t") == f"a {BEGIN}\n\nt\n\n{END} b"
+    assert main([str(tmp_path / "none"), str(ROOT / "docs" / "results.md")]) == 1
+    assert "none" in capsys.readouterr().err
+    assert main([]) == 2

@@ -1,0 +1,72 @@
+"""A run knows where its scene is, wherever it is opened from."""
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ngi.configuration import scene_place
+from ngi.learn import RunFolder
+from ngi.resources import root
+from ngi.view.run_settings import describe_scene
+from tests.test_configuration import composed
+
+SETTINGS: dict[str, Any] = {
+    "scene": {"name": "my-lamp", "hash": "0"},
+    "renderer": {"_target_": "ngi.render.workers.mitsuba_renderer"},
+}
+
+
+def begun(folder: Path, scene: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A run of a scene below $NGI_SCENES, which is not set when the run is opened."""
+    shutil.copytree(root() / "scenes" / "mirror", scene)
+    monkeypatch.setenv("NGI_SCENES", str(scene.parent))
+    place = scene_place(composed(f"scene={scene.name}"))
+    monkeypatch.delenv("NGI_SCENES")
+    run = RunFolder(folder, settings=SETTINGS)
+    run.begin(scene_place=place)
+    run.close()
+    return folder
+
+
+def test_a_run_finds_its_scene_without_being_told(tmp_path, monkeypatch) -> None:
+    scene = tmp_path / "elsewhere" / "my-lamp"
+    folder = begun(tmp_path / "run", scene, monkeypatch)
+    described = describe_scene(folder, SETTINGS, None)
+    assert described is not None
+    assert described.document.path == scene / "scene.xml"
+    shutil.rmtree(scene)
+    with pytest.raises(ValueError, match=rf"'my-lamp' is not known here, nor at {scene}: name"):
+        describe_scene(folder, SETTINGS, None)
+
+
+def test_where_the_scene_is_is_no_part_of_the_identity(tmp_path, monkeypatch) -> None:
+    folder = begun(tmp_path / "run", tmp_path / "elsewhere" / "my-lamp", monkeypatch)
+    identity = (folder / "settings.json").read_text()
+    run = RunFolder(folder, settings=SETTINGS)
+    run.begin(scene_place={"_target_": "ngi.scene.read_scene", "folder": "/moved"})
+    run.close()
+    assert (folder / "settings.json").read_text() == identity
+
+
+@pytest.mark.parametrize("content", ["{", "[]", "{}", '{"_target_": "os.system"}'])
+def test_a_damaged_place_is_named(tmp_path, content: str) -> None:
+    (tmp_path / "scene.json").write_text(content)
+    with pytest.raises(ValueError, match=r"scene\.json is damaged.*delete it"):
+        describe_scene(tmp_path, SETTINGS, None)
+
+
+def test_closed_formulas_have_no_place() -> None:
+    assert scene_place(composed("renderer=analytic")) is None
+
+
+def test_a_scene_of_the_authors_is_found_by_its_absolute_path(tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    place = scene_place(composed("scene=release", "scene.path=theirs"))
+    assert place is not None
+    assert json.loads(json.dumps(place)) == {
+        "_target_": "ngi.scene.release.read_release",
+        "path": str(tmp_path / "theirs"),
+    }

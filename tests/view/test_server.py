@@ -1,0 +1,64 @@
+"""No page of another origin can drive the viewer, and texts of files are shown as they are."""
+
+from collections.abc import Iterator
+
+import pytest
+
+viser = pytest.importorskip("viser", reason="needs pip install -e .[viewer]")
+
+from websockets.exceptions import InvalidStatus  # noqa: E402
+from websockets.sync.client import connect  # noqa: E402
+from websockets.typing import Origin, Subprotocol  # noqa: E402
+
+from ngi.view.page import ErrorPage  # noqa: E402
+from ngi.view.server import fenced, is_own_page  # noqa: E402
+
+
+@pytest.fixture(scope="module")
+def port() -> Iterator[int]:
+    page = ErrorPage("nothing", host="127.0.0.1", port=0)
+    yield int(page.address.rsplit(":", 1)[1])
+    page.close()
+
+
+def opened(port: int, origin: str | None) -> bool:
+    try:
+        with connect(
+            f"ws://127.0.0.1:{port}",
+            origin=None if origin is None else Origin(origin),
+            subprotocols=[Subprotocol(f"viser-v{viser.__version__}")],
+        ):
+            return True
+    except InvalidStatus as refusal:
+        return refusal.response.status_code != 403
+
+
+def test_pages_of_other_origins_are_refused(port: int) -> None:
+    assert not opened(port, "https://elsewhere.example")
+    assert not opened(port, f"http://127.0.0.1:{port + 1}")
+    assert not opened(port, "null")
+
+
+def test_its_own_page_and_programs_are_let_in(port: int) -> None:
+    assert opened(port, f"http://127.0.0.1:{port}")
+    assert opened(port, None)
+
+
+@pytest.mark.parametrize(
+    ("origin", "name", "host", "own"),
+    [
+        ("http://localhost:9000", "localhost:9000", "127.0.0.1", True),  # through a tunnel
+        ("http://evil.example:8080", "evil.example:8080", "127.0.0.1", False),  # resolves here
+        ("http://box.lan:8080", "box.lan:8080", "0.0.0.0", True),
+        ("http://evil.example", "box.lan:8080", "0.0.0.0", False),
+        ("http://localhost:8080", None, "127.0.0.1", False),
+    ],
+)
+def test_origins(origin: str, name: str | None, host: str, own: bool) -> None:
+    assert is_own_page(origin, name, host=host) is own
+
+
+def test_a_message_cannot_leave_its_fence() -> None:
+    assert fenced("plain") == "```\nplain\n```"
+    message = "a\n```\n<img src=x onerror=alert(1)>\n````"
+    assert fenced(message) == f"`````\n{message}\n`````"
