@@ -6,7 +6,8 @@ BIN := $(VENV)/bin
 SWEEPS := same_time preconditioning resolution target_function acceptance histogram dimensions specular chess cnsr anf denoising sampling
 BUDGET ?= small
 OPTIONS ?=
-.PHONY: help setup demo test report docs lint smoke benchmark doctor clean
+SCENE ?= living-room
+.PHONY: help setup demo view test report docs lint smoke benchmark doctor clean
 
 help: ## list the commands
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 14
@@ -17,9 +18,12 @@ $(VENV)/.complete: pyproject.toml constraints.txt tools/setup.sh
 	@PYTHON=$(PYTHON) VENV=$(VENV) sh tools/setup.sh
 	@touch $@
 
-demo: setup ## train exploration and uniform sampling, compare them: 15 minutes
+demo: setup ## train ours, the paper's method and uniform sampling, compare them: 15 minutes
 	@$(BIN)/python -m ngi.train -m +sweeps=demo; status=$$?; \
 	$(BIN)/python -m analysis.report outputs/demo && exit $$status
+
+view: setup ## trained networks in the browser: SCENE=living-room|sphere-caustic|veach-egg
+	@$(BIN)/python -m ngi.view run=scenes/$(SCENE)/network
 
 test: setup lint smoke ## linter, type checker, all tests, smoke run on real renders
 	@sh tools/browser.sh

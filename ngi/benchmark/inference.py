@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from ngi.benchmark.figures import Figure, figure, in_turn
 from ngi.benchmark.scenes import Scene
@@ -103,11 +103,12 @@ def _per_second(seconds: Sequence[float]) -> list[float]:
     return [1 / t for t in seconds]
 
 
-def show(network: PixelGenerator, buffers: Tensor, v: Tensor, precision: torch.dtype) -> Tensor:
+def show(network: nn.Module, buffers: Tensor, v: Tensor, precision: torch.dtype) -> Tensor:
     """The network's image, [H, W, 3] on the CPU, as a viewer asks for it."""
-    device = network.input_layer.weight.device
+    device = next(network.parameters()).device
     with torch.autocast(device.type, torch.bfloat16, enabled=precision == torch.bfloat16):
-        return network.render(buffers.to(device), v.to(device)).cpu()
+        image: Tensor = network.render(buffers.to(device), v.to(device))  # type: ignore[operator]
+    return image.cpu()
 
 
 def products(network: PixelGenerator, precision: torch.dtype) -> Callable[[], None]:

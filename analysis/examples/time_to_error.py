@@ -1,0 +1,72 @@
+"""When does one method have less error than another has at its end?
+
+`python -m analysis.examples.time_to_error FOLDER METHOD BASELINE` prints, scene by scene, the
+errors at the end, and the part of the baseline's run time after which the method's error on the
+hard frames (geometric mean of the metrics) stays below that with which the baseline ends, means
+over the seeds that both have. Cells begin with `# %%`, see `questions.py`.
+"""
+
+# %%
+import sys
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import t
+from tabulate import tabulate
+
+from analysis.runs import METRICS, Run, find_runs
+from analysis.speedup import log_error_series, time_to_stay_below
+
+folder, method, baseline = sys.argv[1:4]
+runs: dict[tuple[str, str, int], Run] = {
+    (run.scene, run.label["method"], run.seed): run for run in find_runs(Path(folder))[0]
+}
+
+
+# %% Means and 95 % intervals over seeds
+def interval(values: list[float]) -> str:
+    """Mean, and half the width of Student's interval where there are several values."""
+    if len(values) < 2:
+        return f"{np.mean(values):.3f}"
+    half = t.ppf(0.975, len(values) - 1) * np.std(values, ddof=1) / np.sqrt(len(values))
+    return f"{np.mean(values):.3f} ± {half:.3f}"
+
+
+# %% A row per scene
+rows = []
+for scene in sorted({scene for scene, _, _ in runs}):
+    seeds = [s for place, m, s in runs if (place, m) == (scene, method)]
+    both = [
+        (runs[scene, method, s], runs[scene, baseline, s])
+        for s in seeds
+        if (scene, baseline, s) in runs
+    ]
+    if not both:
+        continue
+    parts, differences = [], []
+    for ours, theirs in both:
+        curve, end = log_error_series([ours, theirs])
+        seconds, bound = time_to_stay_below(curve, end[-1, 1])
+        parts.append((seconds / end[-1, 0], bound))
+        differences.append(100 * (np.exp(curve[-1, 1] - end[-1, 1]) - 1))
+    at_most = "at most " if any(bound for _, bound in parts) else ""
+    of = {who: [pair[who] for pair in both] for who in (0, 1)}
+    finals = [
+        " / ".join(
+            f"{np.mean([run.history[f'hard_{metric}'].iloc[-1] for run in of[who]]):.3f}"
+            for metric in METRICS
+        )
+        for who in (0, 1)
+    ]
+    time = f"{at_most}{np.mean([p for p, _ in parts]):.3f}"
+    rows.append([scene, len(both), *finals, f"{interval(differences)} %", time])
+print(f"Hard frames, {' / '.join(METRICS)}; error: {method} against {baseline} at the end;")
+print(f"time: part of its run time after which {method} stays below {baseline}'s final error")
+print(
+    tabulate(
+        rows,
+        ["scene", "seeds", method, baseline, "error", "time"],
+        disable_numparse=True,
+        tablefmt="github",
+    )
+)
