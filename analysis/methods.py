@@ -21,6 +21,8 @@ TITLES = {
     "uniform_growing": "uniform sampling with growing resolution",
     "traced_specular": "traced specular bounces",
     "traced_direct": "traced direct light",
+    "ours_uniform": "ours with uniform sampling",
+    "ours": "ours with a Sobol sequence",
     "sobol": "a Sobol sequence",
     "latin_hypercube": "Latin hypercubes",
     "fixed_data": "a fixed data set",

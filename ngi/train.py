@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import hydra
+from hydra.core.hydra_config import HydraConfig
 from hydra.errors import CompactHydraException
 from hydra.utils import instantiate
 from omegaconf import DictConfig
@@ -218,13 +219,22 @@ def _main(config: DictConfig) -> None:
         # once, in its own log too; the traceback is for those who ask for it.
         log.error("%s", error)
         log.debug("traceback", exc_info=True)
-        raise CompactHydraException(f"{config.run.folder} failed: see above") from error
+        what = "see above" if _shares_the_terminal() else error
+        raise CompactHydraException(f"{config.run.folder} failed: {what}") from error
     hard = result["metrics"]["hard"]
     log.info(
         "%s: %s",
         config.run.folder,
         ", ".join(f"{name} {value['mean']:.4g}" for name, value in hard.items() if value),
     )
+
+
+def _shares_the_terminal() -> bool:
+    """Whether what the job logs is shown where Hydra reports its failure.
+
+    Jobs of Submitit, on this machine or in a cluster, log into files of their own only.
+    """
+    return "submitit" not in HydraConfig.get().launcher._target_
 
 
 def main() -> None:

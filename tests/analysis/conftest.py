@@ -28,10 +28,6 @@ def final_error(set_name: str, metric: str, quality: float, seed: int) -> float:
     return difficulty * TYPICAL[metric] / quality * (1 + 0.1 * math.sin(7 * seed + quality))
 
 
-def final_step(seed: int) -> int:
-    return 1000 + 10 * seed
-
-
 def result_file(
     *, scene: str, sampler: str, seed: int, quality: float, label: dict[str, str], lpips: bool
 ) -> dict[str, Any]:
@@ -75,7 +71,7 @@ def result_file(
         "reference_hash": f"{scene}-references",
         "seconds": {"render": 100.0, "train": 120.0},
         "run_seconds": 240.0 + seed,
-        "steps": final_step(seed),
+        "steps": 1000 + 10 * seed,
         "patches_traced": 16000,
         "paths_traced": 524288000,
         "metrics": metrics,
@@ -94,13 +90,13 @@ def result_file(
     }
 
 
-def write_history(file: Path, *, seed: int, quality: float, lpips: bool) -> None:
+def write_history(file: Path, *, steps: int, seed: int, quality: float, lpips: bool) -> None:
     with file.open("w", newline="") as stream:
         keys = [f"{s}_{m}{suffix}" for s in SETS for m in METRICS for suffix in ("", "_worst5")]
         writer = csv.DictWriter(stream, ["step", "run_seconds", "train_seconds", *keys])
         writer.writeheader()
         for step in range(9):
-            row: dict[str, Any] = {"step": final_step(seed) if step == 8 else 100 * step}
+            row: dict[str, Any] = {"step": steps if step == 8 else 100 * step}
             row["run_seconds"] = 30.0 * step + seed
             row["train_seconds"] = 14.0 * step
             decay = 1 + 6 * math.exp(-step / 2)
@@ -159,7 +155,9 @@ def run_maker(root: Path) -> MakeRun:
         change(result)
         (folder / "settings.json").write_text("{}")
         (folder / "result.json").write_text(json.dumps(result))
-        write_history(folder / "metrics.csv", seed=seed, quality=quality, lpips=lpips)
+        write_history(
+            folder / "metrics.csv", steps=result["steps"], seed=seed, quality=quality, lpips=lpips
+        )
         write_pictures(folder / "pictures", quality=quality)
         return folder
 
@@ -209,13 +207,14 @@ def method_maker(make_run: MakeRun) -> MakeRun:
             method=method,
             **label,
         )
+        steps = json.loads((folder / "result.json").read_text())["steps"]
         keys = [f"{s}_{m}{suffix}" for s in SETS for m in METRICS for suffix in ("", "_worst5")]
         with (folder / "metrics.csv").open("w", newline="") as stream:
             writer = csv.writer(stream)
             writer.writerow(["step", "run_seconds", *keys])
             for step in range(9):
                 value = error * (1 + 7 * math.exp(-rate * 30 * step))
-                number = final_step(seed) if step == 8 else 100 * step
+                number = steps if step == 8 else 100 * step
                 writer.writerow([number, 30.0 * step, *[value] * len(keys)])
         return folder
 

@@ -57,12 +57,12 @@ def test_frames_are_a_value_a_row(folder) -> None:
 
 def test_steps_are_read_where_there_are_any(folder) -> None:
     (with_steps,) = folder.glob("chess/*/seed=0")
-    table = pd.DataFrame({"step": [1, 2], "loss": [0.5, 0.25]})
+    table = pd.DataFrame({"step": [1, 2], "run_seconds": [0.1, 0.2], "loss": [0.5, 0.25]})
     table.to_csv(with_steps / "steps.csv", index=False)
     steps = load_runs(folder).steps
     assert steps.values.tolist() == [
-        ["chess", "uniform", 0, 1, 0.5],
-        ["chess", "uniform", 0, 2, 0.25],
+        ["chess", "uniform", 0, 1, 0.1, 0.5],
+        ["chess", "uniform", 0, 2, 0.2, 0.25],
     ]
     (with_steps / "steps.csv").unlink()
     assert load_runs(folder).steps.columns.tolist() == ["scene", "method", "seed"]
@@ -117,13 +117,17 @@ def test_importing_the_library_loads_nothing_heavy() -> None:
 
 def test_the_steps_that_a_method_had_no_time_for(make_method, tmp_path) -> None:
     """One method is the baseline with every step a quarter slower, the other 10 % worse."""
+
+    def of(steps):
+        return lambda result: result.update(steps=steps)
+
     for seed in range(2):
-        make_method("uniform", seed=seed)
-        slower = make_method("active_exploration", seed=seed) / "metrics.csv"
+        make_method("uniform", seed=seed, change=of(800))
+        slower = make_method("active_exploration", seed=seed, change=of(600)) / "metrics.csv"
         rows = pd.read_csv(slower)
         rows["run_seconds"] *= 1.25
         rows.query("run_seconds <= 240").to_csv(slower, index=False)
-        make_method("metropolis", seed=seed, error=0.11)
+        make_method("metropolis", seed=seed, error=0.11, change=of(800))
     answer = subprocess.run(
         [sys.executable, "-W", "error", "-m", "analysis.examples.same_steps", tmp_path / "runs"],
         capture_output=True,

@@ -22,8 +22,10 @@ def write_curve(folder, errors) -> None:  # type: ignore[no-untyped-def]
 def ratio(make_method, tmp_path):  # type: ignore[no-untyped-def]
     def of(*curves):  # type: ignore[no-untyped-def]
         for seed, (better, worse) in enumerate(curves):
-            write_curve(make_method("active_exploration", seed=seed), better)
-            write_curve(make_method("uniform", seed=seed), worse)
+            for method, errors in (("active_exploration", better), ("uniform", worse)):
+                steps = len(errors)  # one from one evaluation to the next
+                folder = make_method(method, seed=seed, change=lambda r, n=steps: r.update(steps=n))
+                write_curve(folder, errors)
         runs = find_runs(tmp_path)[0]
         return time_ratio(pair_runs(runs, "living-room", "active_exploration", "uniform"))
 

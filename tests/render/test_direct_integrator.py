@@ -12,16 +12,32 @@ NAMES = sorted(set(scenes()) - {"salon-5", "salon-7", "salon-9", "salon-10"})
 """Of the salon's variants only the one that varies everything."""
 
 RESOLUTION, BLOCK = 32, 8
-SAMPLES, BATCHES = 64, 6
-"""Of the reference per pixel and batch, and batches, which tell its noise."""
+PATHS = 384
+"""Of the reference per pixel."""
 RAYS = 64
 """Of the buffers per pixel: four times the usual, so that less is lost in their error."""
 
 
-def reference(renderer) -> np.ndarray:
-    """[BATCHES, n, n, 3]: the direct integrator, less the emission of the very same rays."""
-    scene = renderer._scene.scene
-    camera = mi.traverse(scene.sensors()[0])
+def reference(renderer) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Means [n, n, 3] of the direct integrator less the emission of the very same rays, variances
+    [n, n, 3] of one path, and those of its colours' mean, [n, n].
+
+    The integrator returns squares beside the values: one kernel, rendered once.
+    """
+    direct = mi.load_dict({"type": "direct"})
+
+    class Reflected(mi.SamplingIntegrator):
+        def sample(self, scene, sampler, ray, medium=None, active=True):
+            value, valid, _ = direct.sample(scene, sampler, ray, medium, active)
+            hit = scene.ray_intersect(mi.Ray3f(ray), active)
+            value -= hit.emitter(scene).eval(hit, active)
+            mean = (value[0] + value[1] + value[2]) / 3
+            return value, valid, [*(value * value), mean * mean]
+
+        def aov_names(self):
+            return ["red", "green", "blue", "mean"]
+
+    camera = mi.traverse(renderer._scene.scene.sensors()[0])
     sensor = mi.load_dict(
         {
             "type": "perspective",
@@ -40,17 +56,12 @@ def reference(renderer) -> np.ndarray:
             },
         }
     )
-    integrators = [{"type": "direct"}, {"type": "path", "max_depth": 1}]
-    whole, emitted = (
-        np.stack(
-            [
-                np.array(mi.render(scene, sensor=sensor, integrator=i, spp=SAMPLES, seed=seed))
-                for seed in range(BATCHES)
-            ]
-        )
-        for i in map(mi.load_dict, integrators)
+    image = mi.render(
+        renderer._scene.scene, sensor=sensor, integrator=Reflected(mi.Properties()), spp=PATHS
     )
-    return whole - emitted
+    value, squares = np.split(np.array(image), [3], axis=-1)
+    of_mean = squares[..., 3] - value.mean(-1) ** 2
+    return value, squares[..., :3] - value**2, of_mean
 
 
 def blurred(image: np.ndarray) -> np.ndarray:
@@ -72,14 +83,12 @@ def test_scene(name) -> None:
     v = torch.rand(renderer.dimensions, generator=torch.Generator().manual_seed(7))
     image = renderer.image_buffers(v, resolution=RESOLUTION)
     found = image[..., renderer.layout.slice("direct")].expm1().numpy()
-    batches = reference(renderer)
-    expected = batches.mean(0)
-    variance = batches.var(0, ddof=1) * SAMPLES  # of one path, [n, n, 3]
+    expected, variance, variance_of_mean = reference(renderer)
     ours = blurred(np.sqrt(variance / RAYS))
-    noise = blurred(batches).std(0, ddof=1) / BATCHES**0.5
+    noise = np.sqrt(blurred(variance_of_mean[..., None].repeat(3, -1)) / (PATHS * BLOCK**2))
     error = blurred(found) - blurred(expected)
     assert expected.mean() > 0.01
     assert (abs(error) < 2 * np.hypot(ours, noise) + 1e-4).all(), error
-    random = np.sqrt((variance / RAYS + variance / (SAMPLES * BATCHES)).mean())  # of a pixel
+    random = np.sqrt((variance / RAYS + variance / PATHS).mean())  # of a pixel
     assert abs(error.mean()) < 0.005 * expected.mean() + 0.1 * random
     assert ((found - expected) ** 2).mean() < random**2
