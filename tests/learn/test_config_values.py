@@ -89,6 +89,8 @@ def build(config: DictConfig, folder: Path) -> None:
     """All parts of a run, as `ngi.train` makes them before any long work."""
     check_values(config)
     budget, renderer = instantiate(config.budget), instantiate(config.renderer)
+    schedule = instantiate(config.schedule)
+    schedule.check(budget)
     run_costs(config, budget=budget, renderer=renderer)
     clock = learn.PhaseClock()
     samples = build_samples(config, renderer=renderer)
@@ -102,6 +104,7 @@ def build(config: DictConfig, folder: Path) -> None:
         folder=SimpleNamespace(path=folder),
         tracker=learn.Local(),
         budget=budget,
+        schedule=schedule,
         recorder=None,
         evaluations=config.evaluation.count,
         checkpoint_seconds=config.run.checkpoint_seconds,

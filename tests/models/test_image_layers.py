@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from ngi.models import PixelGenerator, image_layers
+from ngi.models import PixelGenerator, image_layers, pixel_mlp
 from ngi.patches import BufferLayout
 
 CASES = [
@@ -19,7 +19,8 @@ CASES = [
 @pytest.fixture(params=[True, False], ids=["onednn", "pytorch"])
 def library(request, monkeypatch) -> None:
     if not request.param:
-        monkeypatch.setattr(image_layers, "_computed_by_onednn", lambda _: False)
+        for module in (image_layers, pixel_mlp):
+            monkeypatch.setattr(module, "computed_by_onednn", lambda _: False)
 
 
 @pytest.mark.parametrize("options", CASES)
