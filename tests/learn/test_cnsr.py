@@ -67,8 +67,8 @@ def training() -> list[dict[str, float]]:
     )
     test_inputs, truth = samples.example(rendered(samples, seed=10_000))
     found = []
-    for step in range(401):
-        if step in (0, 40, 400):
+    for step in range(801):
+        if step in (0, 40, 800):
             with torch.no_grad():
                 output = network(*test_inputs)
             found.append(
