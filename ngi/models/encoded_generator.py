@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from ngi.models.generator_inputs import check_inputs
+from ngi.models.generator_inputs import check_inputs, check_sizes
 from ngi.models.known_light import add_known_light
 from ngi.models.pixel_encoding import PixelEncoding
 from ngi.models.pixel_generator import CACHED_PIXELS, MANY_PIXELS, RADIANCE_CHANNELS
@@ -39,11 +39,7 @@ class EncodedGenerator(nn.Module):
         directions: bool,
     ) -> None:
         super().__init__()
-        if hidden_features < 1 or hidden_layers < 1:
-            raise ValueError(
-                f"model.hidden_features is {hidden_features} and model.hidden_layers is "
-                f"{hidden_layers}: both must be at least 1"
-            )
+        check_sizes(hidden_features=hidden_features, hidden_layers=hidden_layers)
         self.layout = layout
         self.scene_dimensions = scene_dimensions
         self.encoding = PixelEncoding(layout=layout, octaves=octaves, directions=directions)

@@ -1,4 +1,4 @@
-"""What networks of buffers and scene vectors have to be given."""
+"""What networks of buffers and scene vectors have to be given, and made with."""
 
 from __future__ import annotations
 
@@ -20,4 +20,13 @@ def check_inputs(
         raise ValueError(
             f"scene vector of shape {list(scene_vector.shape)}: expected "
             f"{[len(buffers), scene_dimensions]}"
+        )
+
+
+def check_sizes(*, hidden_features: int, hidden_layers: int) -> None:
+    """ValueError for a network without a hidden layer, or with an empty one."""
+    if hidden_features < 1 or hidden_layers < 1:
+        raise ValueError(
+            f"model.hidden_features is {hidden_features} and model.hidden_layers is "
+            f"{hidden_layers}: both must be at least 1"
         )

@@ -8,7 +8,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from ngi.models.generator_inputs import check_inputs
+from ngi.models.generator_inputs import check_inputs, check_sizes
 from ngi.models.image_layers import ImageLinear, layer_inputs
 from ngi.models.known_light import add_known_light
 from ngi.models.patch_linear import PatchLinear
@@ -54,11 +54,7 @@ class PixelGenerator(nn.Module):
         super().__init__()
         if scene_dimensions < 0:
             raise ValueError(f"scene_dimensions is {scene_dimensions}: it cannot be negative")
-        if hidden_features < 1 or hidden_layers < 1:
-            raise ValueError(
-                f"model.hidden_features is {hidden_features} and model.hidden_layers is "
-                f"{hidden_layers}: both must be at least 1"
-            )
+        check_sizes(hidden_features=hidden_features, hidden_layers=hidden_layers)
         if negative_slope < 0:
             raise ValueError(f"model.negative_slope is {negative_slope}: it cannot be negative")
         self.layout = layout
