@@ -12,7 +12,7 @@ SCENE ?= living-room
 help: ## list the commands
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 14
 
-setup: $(VENV)/.complete ## virtual environment, pinned dependencies, libLLVM
+setup: $(VENV)/.complete ## virtual environment, pinned dependencies, libLLVM, AlexNet for LPIPS (233 MB; LPIPS=no: without)
 
 $(VENV)/.complete: pyproject.toml constraints.txt tools/setup.sh
 	@PYTHON=$(PYTHON) VENV=$(VENV) sh tools/setup.sh
@@ -49,7 +49,7 @@ report: setup ## all sweeps at BUDGET=smoke|small|paper: runs what is missing, b
 
 docs: $(VENV)/.docs ## the documentation as a site in build/site, with warnings as errors
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
-	@echo "written to build/site/index.html"
+	@echo "written to build/site/index.html; with search: python3 -m http.server -d build/site"
 
 $(VENV)/.docs: $(VENV)/.complete
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt \

@@ -5,6 +5,11 @@ installed. `load_runs(folder)` gives the runs as pandas frames; `analysis/exampl
 answer questions.
 """
 
+import logging
+
 from analysis.library import Results, load_runs
+
+# Of a missing font cache or an unwritable home it says much that is of no use to anybody here.
+logging.getLogger("matplotlib").setLevel(logging.ERROR)
 
 __all__ = ["Results", "load_runs"]

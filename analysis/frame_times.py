@@ -10,7 +10,7 @@ from analysis.runs import Run
 from analysis.tables import Cell, Table
 
 _PARTS = ("buffers", "paths", "denoiser", "path tracing", "network")
-"""Of a frame, as `ngi.denoise.run` names them; the last two are whole frames."""
+"""Of a frame, as `ngi.methods.path_tracing.run` names them; the last two are whole frames."""
 
 
 def frame_table(runs: Sequence[Run]) -> Table:

@@ -15,6 +15,9 @@ from analysis.tables import MISSING, Cell, Table
 SHOWN_DIGITS = 12
 """Of commits and hashes in tables; provenance.csv has them whole."""
 
+THEN = " then "
+"""Between the commits of a run that was interrupted and went on with another one."""
+
 _COLUMNS = {
     "commit": "commit",
     "dirty": "changed files",
@@ -37,8 +40,8 @@ def provenance_frame(runs: Sequence[Run]) -> pd.DataFrame:
                 "scene": run.scene,
                 "method": run.method,
                 "seed": run.seed,
-                "commit": result.get("commit"),
-                "dirty": result.get("dirty"),
+                "commit": THEN.join(_commits(run)) or None,
+                "dirty": any(v.get("dirty") for v in run.versions),
                 "identity": result.get("identity"),
                 "scene_hash": result["scene_hash"],
                 "reference_hash": result["reference_hash"],
@@ -75,6 +78,11 @@ def machine_table(runs: Sequence[Run]) -> Table:
     return Table("Machines and versions", ("machine", "what it is", "versions"), rows, 3)
 
 
+def _commits(run: Run) -> dict[str, None]:
+    """Of the run's versions, each once and in order; none outside git."""
+    return dict.fromkeys(version["commit"] for version in run.versions if version["commit"])
+
+
 def _machines(runs: Sequence[Run]) -> dict[str, tuple[dict[str, Any], dict[str, Any]]]:
     return {
         _machine_key(run): (run.result.get("machine", {}), run.result.get("versions", {}))
@@ -97,4 +105,4 @@ def _shown(value: Any) -> str:
         return MISSING
     if isinstance(value, bool):
         return "yes" if value else "no"
-    return str(value)[:SHOWN_DIGITS]
+    return THEN.join(part[:SHOWN_DIGITS] for part in str(value).split(THEN))

@@ -47,12 +47,17 @@ def readme_table(results: str) -> str:
     return "\n".join(rows)
 
 
-def with_table(readme: str, table: str) -> str:
+def with_table(page: str, table: str) -> str:
     """The page with this table. Raises ValueError where the markers are missing."""
-    pattern = re.compile(f"{re.escape(BEGIN)}.*?{re.escape(END)}", re.DOTALL)
-    if not pattern.search(readme):
-        raise ValueError(f"page: put the lines '{BEGIN}' and '{END}' where the table belongs")
-    return pattern.sub(lambda _: f"{BEGIN}\n\n{table}\n\n{END}", readme)
+    return between_markers(page, table, begin=BEGIN, end=END)
+
+
+def between_markers(page: str, table: str, *, begin: str, end: str) -> str:
+    """The page with the table between these two lines. Raises ValueError where they are missing."""
+    pattern = re.compile(f"{re.escape(begin)}.*?{re.escape(end)}", re.DOTALL)
+    if not pattern.search(page):
+        raise ValueError(f"page: put the lines '{begin}' and '{end}' where the table belongs")
+    return pattern.sub(lambda _: f"{begin}\n\n{table}\n\n{end}", page)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -40,6 +40,7 @@ from analysis.tables import (
     worst_table,
 )
 from analysis.verdicts import judge
+from analysis.wandb_report import send
 
 
 @dataclass(frozen=True)
@@ -187,6 +188,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--output", metavar="PATH", type=Path, help="where to write; by default FOLDER/report"
     )
+    parser.add_argument(
+        "--wandb",
+        metavar="PROJECT",
+        help="log the tables at Weights & Biases; see docs/guide/wandb",
+    )
     arguments = parser.parse_args(argv)
     try:
         report = write_report(arguments.folder, arguments.output or arguments.folder / "report")
@@ -199,6 +205,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     print("\nWritten:")
     for file in report.files:
         print(f"  {file}")
+    if arguments.wandb is not None:
+        name = arguments.folder.resolve().name
+        try:
+            print(f"  {send(report.files, name=name, project=arguments.wandb)}")
+        except Exception as error:  # whatever W&B raises: the report itself is written
+            print(f"error: Weights & Biases: {error}", file=sys.stderr)
+            return 1
     return 0
 
 

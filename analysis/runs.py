@@ -51,6 +51,15 @@ class Run:
     def seed(self) -> int:
         return self.result["seed"]
 
+    @property
+    def versions(self) -> list[dict[str, Any]]:
+        """Of the program, in order: 'commit', 'dirty' and perhaps 'code', a hash over its modules.
+
+        Several where the run was interrupted and the program changed before it went on.
+        """
+        last = {key: self.result.get(key) for key in ("commit", "dirty")}
+        return self.result.get("commits") or [last]
+
     def metric(self, set_name: str, metric: str, statistic: str = "mean") -> float | None:
         """One metric at the end of the run; statistic is mean, worst5 or floor; None if missing."""
         summary = self.result["metrics"][set_name][metric]
@@ -165,7 +174,7 @@ def comparison_warnings(runs: Sequence[Run]) -> list[str]:
                 f"{scene}: the runs were not given the same time: {times[shortest]:.0f} s in "
                 f"{shortest}, {times[longest]:.0f} s in {longest}"
             )
-    if changed := [run.folder for run in runs if run.result.get("dirty")]:
+    if changed := [r.folder for r in runs if any(v.get("dirty") for v in r.versions)]:
         warnings.append(
             f"{len(changed)} run(s) were made with uncommitted changes, for example {changed[0]}"
         )
@@ -180,6 +189,8 @@ def comparison_warnings(runs: Sequence[Run]) -> list[str]:
         if len(first) > 1:
             found = "; ".join(f"{name} in {folder}" for name, folder in first.items())
             warnings.append(f"the runs {what}: {found}")
+            if value is _commits and _one_program(runs):
+                warnings[-1] += "; the program itself is the same"
     return warnings
 
 
@@ -189,9 +200,21 @@ def _clock(run: Run) -> str:
 
 
 def _commits(run: Run) -> str:
-    """Of all versions of the code that the run was made with, in order."""
-    versions = run.result.get("commits") or [{"commit": run.result.get("commit")}]
-    return " then ".join(dict.fromkeys(str(version["commit"])[:12] for version in versions))
+    """Of all versions of the program that the run was made with, in order; changed ones by hash."""
+    return " then ".join(dict.fromkeys(map(_named, run.versions)))
+
+
+def _named(version: dict[str, Any]) -> str:
+    commit = str(version["commit"])[:12]
+    if not version.get("dirty"):
+        return commit
+    return f"{commit} and changes ({version['code'][:8]})" if "code" in version else commit
+
+
+def _one_program(runs: Sequence[Run]) -> bool:
+    """Whether all runs are known to be made with the same modules, whatever the commit."""
+    codes = {version.get("code") for run in runs for version in run.versions}
+    return len(codes) == 1 and None not in codes
 
 
 def _machine(run: Run) -> str:

@@ -37,13 +37,14 @@ WAY = {
         Verb("export", "ngi.export", "the network as one ONNX file, for other programs"),
     ),
     "Scenes": (
-        Verb("describe", "ngi.scene.describe", "what varies in a scene, or could; what is wrong"),
-        Verb("gallery", "ngi.scene.gallery", "a contact sheet of every scene"),
+        Verb("describe", "ngi.view.describe", "what varies in a scene, or could; what is wrong"),
+        Verb("gallery", "ngi.view.gallery", "a contact sheet of every scene"),
     ),
     "Measure": (
         Verb("costs", "ngi.costs", "what steps cost here, to count run time fairly when training"),
-        Verb("benchmark", "ngi.benchmark.__main__", "how fast every part of the program is"),
-        Verb("stability", "ngi.stability.__main__", "what becomes of extreme and stiff cases"),
+        Verb("metrics", "ngi.metrics", "metrics again, from a run's linear pictures"),
+        Verb("benchmark", "ngi.benchmark", "how fast every part of the program is"),
+        Verb("stability", "ngi.stability", "what becomes of extreme and stiff cases"),
     ),
 }
 """The verbs, in the order in which one meets them."""

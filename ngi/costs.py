@@ -6,7 +6,6 @@ import json
 import logging
 import os
 import sys
-from collections.abc import Sequence
 from contextlib import closing
 from functools import cache
 from pathlib import Path
@@ -14,16 +13,17 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import hydra
-from hydra.errors import CompactHydraException
 from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf, open_dict
 from tabulate import tabulate
 
-from ngi.build import build_module, build_samples, build_stream, plain, run_components
-from ngi.config_values import check_values
-from ngi.configuration import register
-from ngi.memory import keep_freed_memory
-from ngi.resources import cache_folder, root
+from ngi.config.build import build_module, build_samples, build_stream, plain, run_components
+from ngi.config.command_words import completed, with_overrides
+from ngi.config.configuration import register
+from ngi.config.hydra_program import MESSAGES, fail, run_program
+from ngi.config.values import check_values
+from ngi.files.resources import cache_folder, root
+from ngi.machine.memory import keep_freed_memory
 
 if TYPE_CHECKING:
     from ngi.learn import Component, CostFile
@@ -67,8 +67,8 @@ def measure(config: DictConfig) -> None:
 def _measure(
     config: DictConfig, missing: list[Component], *, renderer: Renderer, file: CostFile
 ) -> None:
-    from ngi.benchmark.step_costs import rendering_seconds
-    from ngi.provenance import provenance
+    from ngi.learn.step_costs import rendering_seconds
+    from ngi.machine.provenance import provenance
 
     _warn_if_busy()
     for component in missing:
@@ -92,7 +92,7 @@ def _step_seconds(
 ) -> dict[str, dict[str, list[float]]]:
     """Trains for a few seconds, with steps of all kinds in turn."""
     from ngi import learn
-    from ngi.benchmark.step_costs import StepTimer, step_seconds
+    from ngi.learn.step_costs import StepTimer, step_seconds
     from ngi.render import AnalyticRenderer
 
     stand_in = AnalyticRenderer(
@@ -100,27 +100,20 @@ def _step_seconds(
     )
     config = config.copy()
     with open_dict(config):
-        here = "ngi.benchmark.step_costs"
+        here = "ngi.learn.step_costs"
         config.reuse.policy = {"_target_": f"{here}.InTurn"}
-        config.sampler.acceptance = {"_target_": f"{here}.ScoredInTurn", "scored": scored}
+        if "acceptance" in config.sampler:
+            config.sampler.acceptance = {"_target_": f"{here}.ScoredInTurn", "scored": scored}
     with TemporaryDirectory() as folder:
         clock = learn.PhaseClock()
         run = learn.RunFolder(Path(folder), settings={})
         samples = build_samples(config, renderer=stand_in)
         stream = build_stream(config, samples=samples, clock=clock, patches=run.patches)
-        module = build_module(config, samples=samples, target=stream.sampler.target, clock=clock)
+        module = build_module(config, samples=samples, stream=stream, folder=Path(folder))
         timer = StepTimer(clock=clock, scored=scored, seconds=SECONDS)
-        guard = learn.StepGuard(stream=stream, folder=Path(folder))
-        feedback = learn.SamplerFeedback(
-            stream=stream,
-            clock=clock,
-            run_clock=clock,
-            folder=run,
-            tracker=learn.Local(),
-            guard=guard,
-        )
+        steps = learn.StepLog(stream=stream, run_clock=clock, folder=run, tracker=learn.Local())
         trainer = instantiate(config.trainer)(
-            default_root_dir=folder, max_steps=-1, callbacks=[guard, feedback, timer]
+            default_root_dir=folder, max_steps=-1, callbacks=[steps, timer]
         )
         with closing(run):
             trainer.fit(module, learn.ExplorationDataModule(stream=stream))
@@ -159,10 +152,8 @@ def _table(wanted: list[Component], *, new: list[Component], file: CostFile) -> 
 def _main(config: DictConfig) -> None:
     try:
         measure(config)
-    except (ValueError, OSError, RuntimeError, FloatingPointError, TypeError) as error:
-        log.error("%s", error)
-        log.debug("traceback", exc_info=True)
-        raise CompactHydraException(str(error)) from error
+    except MESSAGES as error:
+        fail(error, job=config.label.scene)
 
 
 def main() -> None:
@@ -170,18 +161,8 @@ def main() -> None:
     register()
     folder = cache_folder() / "costs"
     places = (f"hydra.{mode}.dir={folder}" for mode in ("run", "sweep"))
-    sys.argv[1:] = with_overrides(sys.argv[1:], "hydra/help=costs", *places)
-    _main()
-
-
-def with_overrides(arguments: Sequence[str], *overrides: str) -> list[str]:
-    """Hydra's command line with further overrides, before all others: those that follow win.
-
-    Overrides have to stand together, which argparse asks for.
-    """
-    are_overrides = ("=" in argument and argument[0] != "-" for argument in arguments)
-    first = next((i for i, is_override in enumerate(are_overrides) if is_override), len(arguments))
-    return [*arguments[:first], *overrides, *arguments[first:]]
+    sys.argv[1:] = with_overrides(completed(sys.argv[1:]), "hydra/help=costs", *places)
+    run_program(_main)
 
 
 if __name__ == "__main__":

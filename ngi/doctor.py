@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from ngi.provenance import LIBRARIES
+from ngi.machine.provenance import LIBRARIES
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def torch_device() -> Finding:
 
 
 def llvm() -> Finding:
-    from ngi.llvm import INSTALL_COMMAND, find_llvm, llvm_candidates
+    from ngi.machine.llvm import INSTALL_COMMAND, find_llvm, llvm_candidates
 
     chosen = find_llvm()
     if chosen is not None:
@@ -103,7 +103,7 @@ def optix() -> Finding:
 def renderer() -> Finding:
     """Which backends work; asked in a child process, since a broken driver can abort it."""
     code = """
-from ngi.backend import activate, cuda_problem, llvm_problem
+from ngi.machine.backend import activate, cuda_problem, llvm_problem
 problems = {"cuda": cuda_problem(), "llvm": llvm_problem()}
 print(activate("auto"))
 for name, problem in problems.items():

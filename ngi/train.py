@@ -3,36 +3,31 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+import sys
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import hydra
-from hydra.core.hydra_config import HydraConfig
-from hydra.errors import CompactHydraException
 from hydra.utils import instantiate
 from omegaconf import DictConfig
 
-from ngi.build import build_module, build_samples, build_stream, plain, run_costs
-from ngi.config_values import check_values
-from ngi.configuration import register, run_settings, scene_place
-from ngi.energy import EnergyMeter, energy_counters
-from ngi.memory import keep_freed_memory
-from ngi.provenance import code_commit
-from ngi.resources import root
+from ngi.config.build import build_recorder, build_run, plain, run_costs
+from ngi.config.command_words import completed, with_overrides
+from ngi.config.configuration import register, run_settings, scene_place
+from ngi.config.hydra_program import MESSAGES, fail, run_program
+from ngi.config.outline import only_bootstrap, outline
+from ngi.config.values import check_values
+from ngi.files.resources import root
+from ngi.machine.memory import keep_freed_memory
 
 if TYPE_CHECKING:
     from ngi import learn
     from ngi.learn.lightning_api import Callback, Trainer
-    from ngi.render import Renderer
     from ngi.view.live import LiveView
 
 log = logging.getLogger(__name__)
-
-MESSAGES = (ValueError, OSError, RuntimeError, FloatingPointError, TypeError)
-"""Exceptions whose text says to users what is wrong; all others are bugs."""
 
 
 def train(config: DictConfig) -> dict[str, Any]:
@@ -43,6 +38,7 @@ def train(config: DictConfig) -> dict[str, Any]:
     does not fit, before any long work; `Interrupted` after SIGTERM or SIGINT.
     """
     from ngi import learn  # PyTorch and Lightning take seconds that --help need not wait for
+    from ngi.learn.code_change import heed_code_change
 
     keep_freed_memory()
     check_values(config)
@@ -53,18 +49,33 @@ def train(config: DictConfig) -> dict[str, Any]:
             stack.callback(renderer.close)
             costs = run_costs(config, budget=budget, renderer=renderer)
             settings = run_settings(config, scene_hash=renderer.scene_hash, costs=costs)
-            folder = learn.RunFolder(Path(config.run.folder), settings=settings)
+            folder = learn.RunFolder(
+                Path(config.run.folder),
+                settings=settings,
+                linear_megabytes=config.run.linear_megabytes,
+            )
             stack.callback(folder.close)
             tracker = instantiate(config.tracker)
             stack.push(partial(_finish, tracker))
-            if folder.result is not None:
+            heed_code_change(folder, on_change=config.run.on_code_change)
+            if (result := folder.result) is not None:
                 log.info("%s is finished already; delete the folder to run it again", folder.path)
-                return folder.result
+                tracker.finished(folder=folder.path, settings=settings, label=result["label"])
+                return result
             if "path_tracing" in config:
-                from ngi.denoise.run import run_path_tracing
+                from ngi.methods.path_tracing.run import run_path_tracing
 
                 return run_path_tracing(config, renderer=renderer, folder=folder, tracker=tracker)
-            return _train(config, budget, renderer, folder, tracker, interruption, stack)
+            log.info("%s", outline(plain(config)))
+            run = build_run(
+                config,
+                folder=folder,
+                tracker=tracker,
+                interruption=interruption,
+                budget=budget,
+                renderer=renderer,
+            )
+            return _train(config, run, closing=stack)
 
 
 def _finish(tracker: learn.Tracker, failure: type[BaseException] | None, *_: object) -> None:
@@ -72,137 +83,77 @@ def _finish(tracker: learn.Tracker, failure: type[BaseException] | None, *_: obj
     tracker.finish(failed=failure is not None)
 
 
-def _train(
-    config: DictConfig,
-    budget: learn.Budget,
-    renderer: Renderer,
-    folder: learn.RunFolder,
-    tracker: learn.Tracker,
-    interruption: learn.Interruption,
-    closing: ExitStack,
-) -> dict[str, Any]:
+def _train(config: DictConfig, run: learn.Run, *, closing: ExitStack) -> dict[str, Any]:
     """closing: closes what is opened here"""
     from ngi import learn
-    from ngi.learn.code_versions import record_code_version
 
-    schedule = instantiate(config.schedule)
-    schedule.check(budget)
-    clock = learn.PhaseClock(energy=EnergyMeter(energy_counters()))
-    samples = build_samples(config, renderer=renderer)
-    stream = build_stream(config, samples=samples, clock=clock, patches=folder.patches)
-    module = build_module(config, samples=samples, target=stream.sampler.target, clock=clock)
-    costs = folder.settings["costs"]
-    run_clock = (
-        clock if costs is None else learn.ModelClock(costs=costs, counters=lambda: stream.counters)
-    )
-    recorder = learn.Recorder(
-        evaluator=instantiate(config.evaluation.evaluator)(
-            renderer=renderer, test_inputs=samples.test_inputs
-        ),
-        target_map=_target_map(config, samples, signals=interruption.checked(module.signals)),
-        predict=interruption.checked(module.predict),
-        folder=folder,
-        stream=stream,
-        clock=clock,
-        run_clock=run_clock,
-        tracker=tracker,
-        label={**plain(config.label), "seed": config.seed},
-        backend=renderer.description,
-    )
+    recorder = build_recorder(config, run)
     callbacks = learn.callbacks(
-        stream=stream,
-        clock=clock,
-        run_clock=run_clock,
-        folder=folder,
-        tracker=tracker,
-        budget=budget,
-        schedule=schedule,
+        run,
         recorder=recorder,
         evaluations=config.evaluation.count,
         checkpoint_seconds=config.run.checkpoint_seconds,
         checkpoint_steps=config.run.checkpoint_steps,
-        interruption=interruption,
     )
-    module.rehearse(samples.blank(2))
+    run.module.rehearse(run.samples.blank(2))
     if config.viewer:
-        view = _live_view(config, renderer, samples, module, stream, folder, clock)
+        view = _live_view(config, run)
         closing.callback(view.close)
         callbacks.append(view)
-    trainer = _trainer(config, budget, folder, callbacks)
-    checkpoint = learn.prepare_resume(folder)
-    folder.begin(scene_place=scene_place(config))
-    commit, dirty = code_commit()
-    record_code_version(folder.path, commit=commit, dirty=dirty, after_step=folder.steps.last_step)
+    trainer = _trainer(config, run, callbacks)
+    checkpoint = learn.prepare_resume(run.folder)
+    _begin(config, run.folder)
     recorder.prepare()
-    renderer.warm_up()
-    with interruption.deferred():
+    run.renderer.warm_up()
+    with run.interruption.deferred():
         trainer.fit(
-            module,
-            learn.ExplorationDataModule(stream=stream),
+            run.module,
+            learn.ExplorationDataModule(stream=run.stream),
             ckpt_path=checkpoint,
             weights_only=True,
         )
-    module.to(trainer.strategy.root_device)  # Lightning has taken it back to the CPU
+    counters = run.stream.counters
+    if problem := only_bootstrap(
+        plain(config), steps=counters.iteration, generated_batches=counters.generated_batches
+    ):
+        log.warning("%s", problem)
+    run.module.to(trainer.strategy.root_device)  # Lightning has taken it back to the CPU
     for optimizer in trainer.optimizers:
         optimizer.load_state_dict(optimizer.state_dict())  # moves its state to the weights
     return recorder.finish()
 
 
-def _trainer(
-    config: DictConfig,
-    budget: learn.Budget,
-    folder: learn.RunFolder,
-    callbacks: list[Callback],
-) -> Trainer:
+def _trainer(config: DictConfig, run: learn.Run, callbacks: list[Callback]) -> Trainer:
     from ngi import learn
 
     checkpoints = learn.AtomicCheckpointIO(
-        identity=folder.identity, previous=folder.previous_checkpoint
+        identity=run.folder.identity, previous=run.folder.previous_checkpoint
     )
     trainer: Trainer = instantiate(config.trainer)(
-        default_root_dir=folder.path,
-        max_steps=budget.maximum_steps,
+        default_root_dir=run.folder.path,
+        max_steps=run.budget.maximum_steps,
         callbacks=callbacks,
         plugins=[checkpoints],
     )
     return trainer
 
 
-def _target_map(
-    config: DictConfig, samples: learn.Samples, *, signals: Callable[..., Any]
-) -> learn.TargetMap | None:
-    """What is measured of the target density at every evaluation, where that is asked for."""
-    if config.evaluation.target_map is None:
-        return None
-    target_map: learn.TargetMap = instantiate(config.evaluation.target_map)(
-        samples=samples,
-        resolution=instantiate(config.resolution).resolution(0),
-        signals=signals,
-    )
-    return target_map
+def _begin(config: DictConfig, folder: learn.RunFolder) -> None:
+    """Writes down where the scene lies, and which code the steps from here on are made with."""
+    from ngi.files.code_versions import record_code_version
+
+    folder.begin(scene_place=scene_place(config))
+    record_code_version(folder.path, after_step=folder.steps.last_step)
 
 
-def _live_view(
-    config: DictConfig,
-    renderer: Renderer,
-    samples: learn.Samples,
-    module: learn.IlluminationModule,
-    stream: learn.TrainingStream,
-    folder: learn.RunFolder,
-    clock: learn.PhaseClock,
-) -> LiveView:
+def _live_view(config: DictConfig, run: learn.Run) -> LiveView:
     """The run in the browser; RuntimeError where the libraries for it are not installed."""
     try:
         from ngi.view.live import live_view
     except ModuleNotFoundError as error:
         raise RuntimeError(f"viewer=true needs {error.name}: pip install -e .[viewer]") from error
     return live_view(
-        renderer=renderer,
-        samples=samples,
-        module=module,
-        stream=stream,
-        folder=folder,
-        clock=clock,
+        run,
         scene_name=config.scene.name,
         description=instantiate(config.scene.reader) if "scene" in config.renderer else None,
         protocol=instantiate(config.evaluation.evaluator.protocol),
@@ -215,12 +166,7 @@ def _main(config: DictConfig) -> None:
     try:
         result = train(config)
     except MESSAGES as error:
-        # Hydra reports only the first failed job of a sweep: each says for itself what was wrong,
-        # once, in its own log too; the traceback is for those who ask for it.
-        log.error("%s", error)
-        log.debug("traceback", exc_info=True)
-        what = "see above" if _shares_the_terminal() else error
-        raise CompactHydraException(f"{config.run.folder} failed: {what}") from error
+        fail(error, job=config.run.folder)
     hard = result["metrics"]["hard"]
     log.info(
         "%s: %s",
@@ -229,18 +175,18 @@ def _main(config: DictConfig) -> None:
     )
 
 
-def _shares_the_terminal() -> bool:
-    """Whether what the job logs is shown where Hydra reports its failure.
+DRY_RUN = "--dry-run"
+"""Word of the command line: shows what would run, and runs nothing."""
 
-    Jobs of Submitit, on this machine or in a cluster, log into files of their own only.
-    """
-    return "submitit" not in HydraConfig.get().launcher._target_
+SWEEP = "+hydra.callbacks.sweep={{_target_:ngi.config.sweep.Sweep,dry_run:{}}}"
 
 
 def main() -> None:
     """Entry point of `ngi train` and `python -m ngi.train`."""
     register()
-    _main()
+    words = [word for word in sys.argv[1:] if word != DRY_RUN]
+    sys.argv[1:] = with_overrides(completed(words), SWEEP.format(str(DRY_RUN in sys.argv).lower()))
+    run_program(_main)
 
 
 if __name__ == "__main__":

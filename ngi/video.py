@@ -11,7 +11,7 @@ from os.path import relpath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ngi.options import option, run_tool
+from ngi.config.options import option, run_tool
 
 if TYPE_CHECKING:
     from ngi.view.film import Film, Measured
@@ -142,8 +142,8 @@ def _labels(folders: Sequence[Path]) -> list[str]:
 
 
 def _write_json(file: Path, options: VideoOptions, film: Film, measured: Measured) -> None:
-    from ngi.durable import write_atomically
-    from ngi.provenance import provenance
+    from ngi.files.durable import write_atomically
+    from ngi.machine.provenance import provenance
 
     first = film.runs[0]
     content = {

@@ -99,4 +99,4 @@ def test_training_takes_the_same_words() -> None:
 def test_a_wrong_option_of_training_is_an_error() -> None:
     answer = ngi_command("train", "sampler=no_such")
     assert answer.returncode == 1
-    assert "Could not find 'sampler/no_such'" in answer.stderr
+    assert "sampler/no_such: there is no such option" in answer.stderr

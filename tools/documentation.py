@@ -70,7 +70,7 @@ def commands() -> str:
         "`--flags`.\n\n"
         f"{table}\n\n"
         "Further programs, for studies of the method itself, are started as modules: "
-        "`python -m ngi.noise`, `python -m ngi.exploration_map`, "
+        "`python -m ngi.studies.noise`, `python -m ngi.exploration_map`, "
         "`python -m analysis.exploration_map`, `python -m analysis.endurance`.\n\n"
         "The exit status is 0 where all went well, 1 where the work failed, 2 for a wrong command, "
         "130 after Ctrl-C, 143 after SIGTERM.\n"

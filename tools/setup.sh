@@ -33,14 +33,17 @@ if ! command -v nvidia-smi >/dev/null 2>&1 && [ -z "${PIP_EXTRA_INDEX_URL:-}${PI
         "PIP_EXTRA_INDEX_URL=<PyTorch's CPU index> make avoids that"
 fi
 "$VENV/bin/python" -m pip install --quiet --disable-pip-version-check \
-    --constraint constraints.txt --editable '.[dev,joblib,slurm,viewer,video,denoise,export]' ||
+    --constraint constraints.txt --editable '.[dev,joblib,slurm,viewer,video,denoise,export,tensorboard,mlflow]' ||
     fail "pip could not install the dependencies; its message stands above"
+
+# LPIPS needs AlexNet's weights; without them its column stays empty. LPIPS=no leaves them out.
+[ "${LPIPS:-yes}" = no ] || "$VENV/bin/python" -m ngi.evaluate.lpips_download || true
 
 # Dr.Jit's fast CPU backend needs libLLVM 17 or newer. Without it everything runs, only slower.
 llvm() {
     "$VENV/bin/python" -c '
 import sys
-from ngi.llvm import find_llvm
+from ngi.machine.llvm import find_llvm
 library = find_llvm()
 print(f"setup: {library or '"'no usable libLLVM'"'}")
 sys.exit(library is None)'

@@ -1,18 +1,6 @@
-"""What needs no training: path tracing at few samples per pixel, and production denoisers of it."""
+"""Production denoisers of path-traced images, and training patches whose noise they take off."""
 
 from ngi.denoise.denoised_job import DenoisedJob
 from ngi.denoise.denoisers import Denoiser, OpenImageDenoise, OptixDenoise, guides
-from ngi.denoise.frame_time import FrameTimes, largest_fitting
-from ngi.denoise.path_tracing import PathTracing, Plan
 
-__all__ = [
-    "DenoisedJob",
-    "Denoiser",
-    "FrameTimes",
-    "OpenImageDenoise",
-    "OptixDenoise",
-    "PathTracing",
-    "Plan",
-    "guides",
-    "largest_fitting",
-]
+__all__ = ["DenoisedJob", "Denoiser", "OpenImageDenoise", "OptixDenoise", "guides"]

@@ -53,14 +53,14 @@ class OptixDenoise:
     """
 
     def __init__(self) -> None:
-        from ngi.backend import cuda_problem
+        from ngi.machine.backend import cuda_problem
 
         if (problem := cuda_problem()) is not None:
             raise RuntimeError(f"path_tracing=optix does not work here: {problem}")
         self._size: tuple[int, int] | None = None
 
     def __call__(self, radiance: Tensor, albedo: Tensor, normal: Tensor) -> Tensor:  # noqa: ARG002
-        from ngi.backend import VARIANTS, mi
+        from ngi.machine.backend import VARIANTS, mi
 
         mi.set_variant(VARIANTS["cuda"])
         height, width = radiance.shape[:2]

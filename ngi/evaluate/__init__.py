@@ -1,6 +1,6 @@
 """How good a network is: protocol, test frames, references, metrics and pictures."""
 
-from ngi.evaluate.evaluation import Evaluation, FrameMetrics
+from ngi.evaluate.evaluation import Comparison, Evaluation, FrameMetrics
 from ngi.evaluate.evaluator import Evaluator
 from ngi.evaluate.frames import Frame, evaluation_frames
 from ngi.evaluate.image_metrics import ImageMetrics, image_metrics
@@ -14,6 +14,7 @@ from ngi.evaluate.references import ReferenceCache
 __all__ = [
     "METRICS",
     "SETS",
+    "Comparison",
     "Evaluation",
     "EvaluationProtocol",
     "Evaluator",

@@ -9,12 +9,15 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+from PIL import Image
 from torch import Tensor
 
 from ngi.evaluate.frames import Frame
-from ngi.evaluate.pictures import write_pictures
+from ngi.evaluate.linear import write_linear
+from ngi.evaluate.pictures import Panels, stacked, write_pictures
 from ngi.evaluate.protocol import METRICS, SETS, EvaluationProtocol
 from ngi.evaluate.reference import Reference
+from ngi.files.durable import full_disk_named
 
 WORST_OF = 20
 """The worst 5 %, one frame of 20, are averaged on their own."""
@@ -50,6 +53,18 @@ def mean(values: Iterable[float]) -> float:
     """Arithmetic mean; NaN or Inf where one of the values is."""
     numbers = list(values)
     return sum(numbers) / len(numbers)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Pictures of a set of frames.
+
+    sheet: a row per frame: prediction, reference, error map
+    error_maps: by frame, as in 'hard 3'
+    """
+
+    sheet: Image.Image
+    error_maps: dict[str, Image.Image]
 
 
 @dataclass(frozen=True)
@@ -130,6 +145,41 @@ class Evaluation:
         if values is None or floors is None:
             return None
         return {"mean": mean(values), "worst5": worst_mean(values), "floor": mean(floors)}
+
+    def write(self, folder: Path, *, linear_megabytes: float) -> str | None:
+        """Writes `folder`/pictures, and into `folder`/linear what `write_linear` writes.
+
+        Returns what that does: the format of the linear pictures, for result.json. Raises OSError
+        with what to do where the disk is full.
+        """
+        with full_disk_named(folder / "pictures"):
+            self.write_pictures(folder / "pictures")
+        linear = {
+            (frame.set, frame.index): (prediction, reference.radiance)
+            for frame, prediction, reference in zip(
+                self.frames, self.predictions, self.references, strict=True
+            )
+        }
+        return write_linear(folder / "linear", linear, megabytes=linear_megabytes)
+
+    def comparison(self, set_name: str) -> Comparison:
+        """The frames of a set, as they are shown elsewhere than in the run's folder."""
+        rows, error_maps = [], {}
+        for frame, metrics, prediction, reference in zip(
+            self.frames, self.metrics, self.predictions, self.references, strict=True
+        ):
+            if frame.set != set_name:
+                continue
+            name = f"{frame.set} {frame.index}"
+            shown = Panels.of(
+                prediction,
+                reference.radiance,
+                epsilon=self.protocol.epsilon,
+                exposure=self.protocol.exposure,
+            )
+            error_maps[name] = shown.error
+            rows.append(shown.triptych(mape=metrics.mape, name=name))
+        return Comparison(stacked(rows), error_maps)
 
     def write_pictures(self, folder: Path) -> None:
         """Writes every frame's prediction, reference, error map and labelled triptych as PNG."""

@@ -11,7 +11,7 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-from ngi.torchvision_operators import ensure_torchvision_operators
+from ngi.machine.torchvision_operators import ensure_torchvision_operators
 
 
 class Lpips:
@@ -23,7 +23,7 @@ class Lpips:
     """
 
     def __init__(self, *, weights: Path | str | None) -> None:
-        path = Path(weights) if weights else _cached_weights()
+        path = Path(weights) if weights else cached_weights()
         self.reason: str | None = None
         """Why there is no LPIPS, in one sentence that says how to get it; None where there is."""
         self._network: nn.Module | None = None
@@ -52,18 +52,15 @@ class Lpips:
             return self._network(x, y).item()
 
 
-def _cached_weights() -> Path:
+def cached_weights() -> Path:
+    """Where PyTorch keeps them."""
     return Path(torch.hub.get_dir()) / "checkpoints" / "alexnet-owt-7be5be79.pth"
 
 
 def _how_to_get_weights(path: Path) -> str:
-    ensure_torchvision_operators()
-    from torchvision.models import AlexNet_Weights
-
-    url = AlexNet_Weights.IMAGENET1K_V1.url
     return (
-        f"no AlexNet weights for LPIPS: get them by `curl --create-dirs -Lo {path} {url}`, "
-        "or name a copy by NGI_LPIPS_WEIGHTS=FILE"
+        "no AlexNet weights for LPIPS: `python -m ngi.evaluate.lpips_download` gets them into "
+        f"{path}, or name a copy by NGI_LPIPS_WEIGHTS=FILE"
     )
 
 

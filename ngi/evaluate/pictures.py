@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import matplotlib
@@ -23,6 +24,8 @@ NON_FINITE = (0, 255, 255)
 
 PANEL = 256
 """Pixels a triptych's panels are enlarged to, by a whole factor, where they are smaller."""
+
+WHITE, BLACK = (255, 255, 255), (0, 0, 0)
 
 _MARGIN = 12
 _TOP = 2 * _MARGIN + 14
@@ -46,19 +49,55 @@ def write_pictures(
     that ends.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    pictures = {
-        "prediction": srgb_picture(prediction, exposure),
-        "reference": srgb_picture(reference, exposure),
-        "error": Image.fromarray(error_picture(prediction, reference, epsilon)),
-    }
+    panels = Panels.of(prediction, reference, epsilon=epsilon, exposure=exposure)
     scale = PngInfo()
     scale.add_text("scale", f"|prediction - reference| / (reference + {epsilon:g}), mean of RGB")
     scale.add_text("colour_map", COLOUR_MAP)
     scale.add_text("maximum", f"{ERROR_RANGE:g}")
-    for kind, picture in pictures.items():
+    for kind, picture in vars(panels).items():
         picture.save(folder / f"{name}_{kind}.png", pnginfo=scale if kind == "error" else None)
-    labels = ("prediction", "reference", f"relative error (MAPE {mape:.3f})")
-    _triptych(list(pictures.values()), labels).save(folder / f"{name}.png")
+    panels.triptych(mape=mape).save(folder / f"{name}.png")
+
+
+@dataclass(frozen=True)
+class Panels:
+    """A frame's pictures, all of one size."""
+
+    prediction: Image.Image
+    reference: Image.Image
+    error: Image.Image
+
+    @classmethod
+    def of(
+        cls, prediction: Tensor, reference: Tensor, *, epsilon: float, exposure: float
+    ) -> Panels:
+        """prediction, reference: [H, W, 3] linear radiance"""
+        return cls(
+            srgb_picture(prediction, exposure),
+            srgb_picture(reference, exposure),
+            Image.fromarray(error_picture(prediction, reference, epsilon)),
+        )
+
+    def triptych(self, *, mape: float, name: str = "") -> Image.Image:
+        """Side by side under labels, then the error map's colour bar. name: of the frame"""
+        labels = (
+            f"{name}: prediction" if name else "prediction",
+            "reference",
+            f"relative error (MAPE {mape:.3f})",
+        )
+        sheet = side_by_side(list(vars(self).values()), labels, room=_BAR_WIDTH + 48)
+        _draw_colour_bar(sheet, left=sheet.width - _BAR_WIDTH - 48, top=_TOP)
+        return sheet
+
+
+def stacked(rows: Sequence[Image.Image]) -> Image.Image:
+    """Pictures of one width, one below the other."""
+    sheet = Image.new("RGB", (rows[0].width, sum(row.height for row in rows)), "white")
+    top = 0
+    for row in rows:
+        sheet.paste(row, (0, top))
+        top += row.height
+    return sheet
 
 
 def error_picture(prediction: Tensor, reference: Tensor, epsilon: float) -> np.ndarray:
@@ -92,22 +131,28 @@ def eight_bit(picture: Tensor) -> np.ndarray:
 
 
 def side_by_side(
-    pictures: Sequence[Image.Image], labels: Sequence[str], *, room: int = 0
+    pictures: Sequence[Image.Image],
+    labels: Sequence[str],
+    *,
+    room: int = 0,
+    paper: tuple[int, int, int] = WHITE,
+    ink: tuple[int, int, int] = BLACK,
 ) -> Image.Image:
     """The pictures, all of one size, each under its label, and `room` pixels to their right.
 
     Smaller ones than `PANEL` are enlarged by a whole factor; labels that are too long are cut.
+    paper, ink: colours of what is around the pictures, and of the labels
     """
     factor = max(1, PANEL // pictures[0].height)
     size = (pictures[0].width * factor, pictures[0].height * factor)
     width = (size[0] + _MARGIN) * len(pictures) + _MARGIN + room
-    sheet = Image.new("RGB", (width, _TOP + size[1] + _MARGIN), "white")
+    sheet = Image.new("RGB", (width, _TOP + size[1] + _MARGIN), paper)
     draw = ImageDraw.Draw(sheet)
     font = ImageFont.truetype(_font_file(), 15)
     for column, (picture, label) in enumerate(zip(pictures, labels, strict=True)):
         left = _MARGIN + column * (size[0] + _MARGIN)
         end = left + size[0] + (room if column == len(pictures) - 1 else 0)
-        draw.text((left, _MARGIN), _cut(label, font, end - left), fill="black", font=font)
+        draw.text((left, _MARGIN), _cut(label, font, end - left), fill=ink, font=font)
         sheet.paste(picture.resize(size, Image.Resampling.NEAREST), (left, _TOP))
     return sheet
 
@@ -117,13 +162,6 @@ def _cut(label: str, font: ImageFont.FreeTypeFont, width: int) -> str:
         return label
     kept = next(n for n in reversed(range(len(label))) if font.getlength(label[:n] + "…") <= width)
     return label[:kept] + "…"
-
-
-def _triptych(pictures: Sequence[Image.Image], labels: Sequence[str]) -> Image.Image:
-    """The pictures side by side, then the error map's colour bar."""
-    sheet = side_by_side(pictures, labels, room=_BAR_WIDTH + 48)
-    _draw_colour_bar(sheet, left=sheet.width - _BAR_WIDTH - 48, top=_TOP)
-    return sheet
 
 
 def _draw_colour_bar(sheet: Image.Image, *, left: int, top: int) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ngi.durable import PARTIAL_SUFFIX, DamagedError, full_disk_named
+from ngi.files.durable import PARTIAL_SUFFIX, DamagedError, full_disk_named
 
 
 @dataclass(frozen=True)

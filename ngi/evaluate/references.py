@@ -11,7 +11,6 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from ngi.durable import DamagedError
 from ngi.evaluate.protocol import EvaluationProtocol
 from ngi.evaluate.reference import (
     Reference,
@@ -19,6 +18,7 @@ from ngi.evaluate.reference import (
     relative_noise,
     write_reference,
 )
+from ngi.files.durable import DamagedError
 from ngi.render.protocol import Renderer
 
 log = logging.getLogger(__name__)

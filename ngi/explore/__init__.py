@@ -5,6 +5,8 @@ Tensors only: neither renderer nor network is known here.
 
 from ngi.explore.acceptance import Acceptance, Always, Greedy, Metropolis
 from ngi.explore.chains import ChainInfo, ChainState, MarkovChains
+from ngi.explore.importance import Importance
+from ngi.explore.predicted import PredictedLoss
 from ngi.explore.proposals import (
     ExponentialPerturbation,
     NormalPerturbation,
@@ -12,6 +14,7 @@ from ngi.explore.proposals import (
     Proposals,
 )
 from ngi.explore.resolution import GrowingResolution, ResolutionSchedule
+from ngi.explore.sampler import Sampler
 from ngi.explore.space_filling import LatinHypercube, Sobol
 from ngi.explore.targets import Constant as ConstantTarget
 from ngi.explore.targets import Loss, LossTimesOutputGradient, LossTimesStep, Signals, Target
@@ -25,6 +28,7 @@ __all__ = [
     "ExponentialPerturbation",
     "Greedy",
     "GrowingResolution",
+    "Importance",
     "LatinHypercube",
     "Loss",
     "LossTimesOutputGradient",
@@ -32,9 +36,11 @@ __all__ = [
     "MarkovChains",
     "Metropolis",
     "NormalPerturbation",
+    "PredictedLoss",
     "ProposalDistribution",
     "Proposals",
     "ResolutionSchedule",
+    "Sampler",
     "Signals",
     "Sobol",
     "Target",

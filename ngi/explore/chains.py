@@ -155,6 +155,8 @@ class MarkovChains:
         target_current: Tensor | None,
         target_proposed: Tensor,
         generator: torch.Generator,
+        *,
+        losses: Tensor | None = None,  # noqa: ARG002
     ) -> tuple[ChainState, ChainInfo]:
         """Each chain goes to its proposal or stays, as the acceptance rule says.
 
@@ -162,6 +164,7 @@ class MarkovChains:
         target_current, target_proposed: [n], of any device, both under the network's current
             weights; `target_current` is ignored where a chain holds no state, and may be None
             where `needs_current` is False
+        losses: not looked at, chains know targets only
 
         Two things come before the rule. A chain that holds no state accepts. And NaN or infinite
         targets neither win nor block: such a proposal is never accepted, and a chain whose current

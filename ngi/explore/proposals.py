@@ -18,10 +18,12 @@ class Proposals:
 
     position: [n, S] float32 in [0, 1), the scene vector and then the patch position
     large_step: [n] bool, whether the proposal is independent of the chain's current state
+    weight: [n] float32, factors of the losses that undo how likely each was; None for 1
     """
 
     position: Tensor
     large_step: Tensor
+    weight: Tensor | None = None
 
 
 class ProposalDistribution(Protocol):

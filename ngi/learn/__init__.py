@@ -1,34 +1,37 @@
 """Where exploration, rendering, reuse and the network meet."""
 
-from ngi.learn.batch import Batch, Counters, Feedback
-from ngi.learn.budget import Budget
-from ngi.learn.callbacks import SamplerFeedback, callbacks
+from ngi.clock.budget import Budget
+from ngi.clock.costs import Component, CostFile, Costs, components
+from ngi.clock.counters import Counters
+from ngi.clock.model_clock import ModelClock
+from ngi.clock.phase_clock import PhaseClock, RunClock
+from ngi.files.record_log import RecordLog
+from ngi.files.row_log import RowLog
+from ngi.files.run_folder import RunFolder
+from ngi.learn.batch import Batch, Feedback
+from ngi.learn.callbacks import StepLog, callbacks
 from ngi.learn.checkpoint import (
     AtomicCheckpointIO,
     checkpoint_bytes,
     prepare_resume,
     read_checkpoint,
 )
-from ngi.learn.clock import PhaseClock, RunClock
-from ngi.learn.costs import Component, CostFile, Costs, components
 from ngi.learn.datamodule import ExplorationDataModule
 from ngi.learn.interruption import Interrupted, Interruption
 from ngi.learn.learning_rate import LearningRate
-from ngi.learn.model_clock import ModelClock
+from ngi.learn.lightning_trackers import MLflow, TensorBoard
 from ngi.learn.module import IlluminationModule, seeded
-from ngi.learn.observation_sets import ObservationSets
-from ngi.learn.record_log import RecordLog
 from ngi.learn.recorder import Recorder
-from ngi.learn.row_log import RowLog
-from ngi.learn.run_folder import RunFolder
+from ngi.learn.run import Run
 from ngi.learn.samples import Example, PatchSamples, Samples, patch_example
 from ngi.learn.schedule import ConstantRate, Schedule, WarmupStableDecay
 from ngi.learn.scorer import Scorer
-from ngi.learn.sequences import Sequences
-from ngi.learn.step_guard import LARGEST_NORM, StepGuard, gradient_norm
+from ngi.learn.step import Learner, Step, training_step
+from ngi.learn.step_guard import LARGEST_NORM, StepGuard
 from ngi.learn.stream import TrainingStream
 from ngi.learn.target_map import TargetMap
-from ngi.learn.tracker import Local, Tracker, WeightsAndBiases
+from ngi.learn.tracker import Local, Tracker
+from ngi.learn.wandb_tracker import WeightsAndBiases
 from ngi.reuse import PatchArchive
 
 __all__ = [
@@ -47,25 +50,28 @@ __all__ = [
     "IlluminationModule",
     "Interrupted",
     "Interruption",
+    "Learner",
     "LearningRate",
     "Local",
+    "MLflow",
     "ModelClock",
-    "ObservationSets",
     "PatchArchive",
     "PatchSamples",
     "PhaseClock",
     "RecordLog",
     "Recorder",
     "RowLog",
+    "Run",
     "RunClock",
     "RunFolder",
-    "SamplerFeedback",
     "Samples",
     "Schedule",
     "Scorer",
-    "Sequences",
+    "Step",
     "StepGuard",
+    "StepLog",
     "TargetMap",
+    "TensorBoard",
     "Tracker",
     "TrainingStream",
     "WarmupStableDecay",
@@ -73,9 +79,9 @@ __all__ = [
     "callbacks",
     "checkpoint_bytes",
     "components",
-    "gradient_norm",
     "patch_example",
     "prepare_resume",
     "read_checkpoint",
     "seeded",
+    "training_step",
 ]

@@ -79,6 +79,7 @@ class ProposalsAhead:
         return {
             "position": self.proposals.position,
             "large_step": self.proposals.large_step,
+            "weight": self.proposals.weight,
             "resolution": self.resolution,
             "seed": self.seed,
         }
@@ -87,7 +88,7 @@ class ProposalsAhead:
     def from_state_dict(cls, state: dict[str, Any]) -> Self:
         """The same proposals, not started."""
         return cls(
-            Proposals(position=state["position"], large_step=state["large_step"]),
+            Proposals(state["position"], state["large_step"], state.get("weight")),
             resolution=state["resolution"],
             seed=state["seed"],
         )

@@ -6,19 +6,7 @@ import numpy as np
 from torch import Tensor
 
 from ngi.explore import ChainInfo, Proposals
-
-MOST_VARIABLES = 62
-"""Positions are left out in scenes of more variables: their files would grow to gigabytes."""
-
-DESCRIPTION = (
-    "One record per generated batch of n chains; step as in steps.csv. "
-    "position [n, S]: the proposals, scene variables and then patch position, in [0, 1] "
-    f"(left out in scenes of more than {MOST_VARIABLES} variables). "
-    "large_step, accepted [n]: a chain that accepted stands at its proposal, any other where it "
-    "stood. initialised [n]: the chain held no state before. "
-    "target_proposed, target_current [n]: target density of the proposal and of the state before, "
-    "under the weights of that step; NaN where it was not computed."
-)
+from ngi.files.records import MOST_VARIABLES
 
 
 def chain_record(
@@ -28,7 +16,9 @@ def chain_record(
     target_proposed: Tensor | None,
     target_current: Tensor | None,
 ) -> dict[str, np.ndarray]:
-    """One step of n chains, as `DESCRIPTION` says; `RunFolder.chains` keeps it, with the step.
+    """One step of n chains, as `ngi.files.records.CHAINS` says.
+
+    `RunFolder.chains` keeps it, with the step.
 
     target_proposed, target_current: [n], of any device; None where nothing was scored
     """

@@ -11,10 +11,10 @@ from typing import Any
 
 import torch
 
-from ngi.durable import DamagedError, serialised, write_atomically
+from ngi.files.durable import DamagedError, serialised, write_atomically
+from ngi.files.run_folder import RunFolder
 from ngi.learn.datamodule import ExplorationDataModule
 from ngi.learn.lightning_api import TorchCheckpointIO
-from ngi.learn.run_folder import RunFolder
 from ngi.reuse import PatchArchive
 
 log = logging.getLogger(__name__)
@@ -24,6 +24,9 @@ IDENTITY = "run_identity"
 
 STREAM = ExplorationDataModule.__qualname__
 """Key of the stream's state."""
+
+STEP_GUARD = "step_guard"
+"""Key of the guard's state."""
 
 DECAYS_FROM = "decays_from"
 """Key, in the state of `BudgetAndCheckpoint`, of the step after which the learning rate's decay
@@ -55,6 +58,18 @@ class AtomicCheckpointIO(TorchCheckpointIO):
         content = {**checkpoint, IDENTITY: self._identity}
         write_atomically(Path(path), checkpoint_bytes(content), keep_old_as=self._previous)
 
+    def load_checkpoint(self, *arguments: Any, **options: Any) -> dict[str, Any]:
+        """Also one whose steps Lightning's automatic optimisation counted, before 0.2.0 was out."""
+        checkpoint: dict[str, Any] = super().load_checkpoint(*arguments, **options)
+        callbacks = checkpoint["callbacks"]
+        if "StepGuard" in callbacks:
+            checkpoint[STEP_GUARD] = callbacks.pop("StepGuard")
+            callbacks["StepLog"] = callbacks.pop("SamplerFeedback")
+            loop = checkpoint["loops"]["fit_loop"]
+            steps = loop["epoch_loop.automatic_optimization.optim_progress"]["optimizer"]["step"]
+            loop["epoch_loop.manual_optimization.optim_step_progress"] = steps
+        return checkpoint
+
 
 def prepare_resume(folder: RunFolder) -> Path | None:
     """The checkpoint to go on from, or None for a fresh start; cuts the logs back to it.
@@ -64,6 +79,8 @@ def prepare_resume(folder: RunFolder) -> Path | None:
     Raises ValueError where both are damaged, where one belongs to another run, and where a run can
     not be trained longer; the folder is left as it was then.
     """
+    if folder.restarted:
+        return None
     checkpoint = _newest_usable(folder)
     if folder.lengthened and checkpoint is not None:
         checkpoint = _before_decay(folder, checkpoint)

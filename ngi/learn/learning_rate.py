@@ -4,12 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from ngi.learn.budget import Budget
-from ngi.learn.clock import RunClock
 from ngi.learn.lightning_api import Callback, LightningModule, Trainer
-from ngi.learn.saving import budget_used
-from ngi.learn.schedule import Schedule
-from ngi.learn.stream import TrainingStream
+from ngi.learn.run import Run
 
 
 class LearningRate(Callback):
@@ -19,13 +15,8 @@ class LearningRate(Callback):
     run that goes on goes on as one that was not broken off.
     """
 
-    def __init__(
-        self, *, schedule: Schedule, budget: Budget, stream: TrainingStream, run_clock: RunClock
-    ) -> None:
-        self._schedule = schedule
-        self._budget = budget
-        self._stream = stream
-        self._run_clock = run_clock
+    def __init__(self, run: Run) -> None:
+        self._run = run
         self._rates: list[float] = []
 
     def on_fit_start(self, trainer: Trainer, _module: LightningModule) -> None:
@@ -39,9 +30,8 @@ class LearningRate(Callback):
         self._set(trainer)
 
     def _set(self, trainer: Trainer) -> None:
-        factor = self._schedule.factor(
-            steps=self._stream.counters.iteration,
-            used=budget_used(self._budget, self._stream, self._run_clock),
+        factor = self._run.schedule.factor(
+            steps=self._run.stream.counters.iteration, used=self._run.budget_used
         )
         for group, rate in zip(_groups(trainer), self._rates, strict=True):
             group["lr"] = rate * factor

@@ -6,7 +6,7 @@ Lightning imports torchvision through torchmetrics, so torchvision's operators c
 import logging
 import warnings
 
-from ngi.torchvision_operators import ensure_torchvision_operators
+from ngi.machine.torchvision_operators import ensure_torchvision_operators
 
 ensure_torchvision_operators()
 

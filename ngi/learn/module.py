@@ -10,11 +10,14 @@ import torch
 from torch import Tensor, nn
 
 from ngi.explore import Signals, Target
-from ngi.learn.batch import Batch, Feedback
-from ngi.learn.clock import PhaseClock
+from ngi.learn.batch import Batch
+from ngi.learn.checkpoint import STEP_GUARD
 from ngi.learn.lightning_api import LightningModule
 from ngi.learn.samples import Example
 from ngi.learn.scorer import Scorer
+from ngi.learn.step import Learner, Step, training_step
+from ngi.learn.step_guard import StepGuard
+from ngi.learn.stream import TrainingStream
 from ngi.models import Averaging, SampleLoss, no_average
 from ngi.patches import Patches
 
@@ -24,15 +27,11 @@ OptimizerFactory = Callable[[Iterable[nn.Parameter]], torch.optim.Optimizer]
 
 
 class IlluminationModule(LightningModule):
-    """Fits `network` to log1p radiance by the mean of `loss` over a batch, weighted as it says.
+    """Lightning's shell around `training_step`, which fits `network` to log1p radiance.
 
-    network: (buffers [n, H, W, C], scene_vector [n, D], or whatever else the samples give it) ->
-        log1p radiance [n, H, W, 3]
-    loss: (prediction, target) -> loss per sample [n]
+    network, loss, example, stream, guard: see `Learner`
     optimizer: makes the optimiser from the parameters
     averaging: makes the average of the network's weights that `predict` uses in their place
-    target: the target density that the chains explore
-    example: see `ngi.learn.Samples.example`
     """
 
     def __init__(
@@ -41,19 +40,28 @@ class IlluminationModule(LightningModule):
         network: nn.Module,
         loss: SampleLoss,
         optimizer: OptimizerFactory,
-        target: Target,
-        clock: PhaseClock,
         example: Callable[[Patches], Example],
+        stream: TrainingStream,
+        guard: StepGuard,
         averaging: Averaging = no_average,
     ) -> None:
         super().__init__()
+        self.automatic_optimization = False  # the step function says what happens, and when
         self.network = network
         self.averaged = averaging(network)
         self.loss = loss
         self._make_optimizer = optimizer
-        self._clock = clock
         self._example = example
-        self._scorer = self._scorer_of(target)
+        self._clock = stream.clock
+        self.learner = Learner(
+            network=network,
+            averaged=self.averaged,
+            loss=loss,
+            example=example,
+            scorer=self._scorer_of(stream.sampler.target),
+            guard=guard,
+            stream=stream,
+        )
 
     def configure_optimizers(self) -> torch.optim.Optimizer:
         return self._make_optimizer(self.network.parameters())
@@ -67,31 +75,35 @@ class IlluminationModule(LightningModule):
         """
         self._check_inputs(patches)
         optimizer = self._make_optimizer(self.network.parameters())
-        with self._scorer.watch(patches, patches, optimizer) as score:
-            losses, prediction = self._losses(patches)
+        with self.learner.scorer.watch(patches, patches, optimizer) as score:
+            losses, prediction = self.learner.losses(patches)
         score(prediction, losses)
 
-    def training_step(self, batch: Batch, batch_idx: int) -> dict[str, Any]:  # noqa: ARG002
-        if batch.current is None:
-            losses, _ = self._losses(batch.patches)
-            feedback = Feedback(losses.detach(), None, None)
-        else:
-            with self._scorer.watch(batch.patches, batch.current, self._optimizer()) as score:
-                losses, prediction = self._losses(batch.patches)
-            feedback = Feedback(losses.detach(), *score(prediction, losses))
-        weighted = losses if batch.loss_weights is None else losses * batch.loss_weights
-        return {"loss": weighted.mean(), "feedback": feedback}
+    def on_fit_start(self) -> None:
+        """ValueError for float16, whose losses have to be scaled for their gradients' sake."""
+        if getattr(self.trainer.precision_plugin, "scaler", None) is not None:
+            raise ValueError(
+                f"trainer.precision: {self.trainer.precision} is not supported; "
+                "choose bf16-mixed (trainer=bf16) or 32-true (trainer=fp32)"
+            )
 
-    def optimizer_step(self, *arguments: Any, **options: Any) -> None:
-        """Lightning's, and the average follows: within the time that counts as training."""
-        super().optimizer_step(*arguments, **options)
-        if self.averaged is not None:
-            self.averaged.update_parameters(self.network)
+    def training_step(self, batch: Batch, batch_idx: int) -> dict[str, Step]:  # noqa: ARG002
+        """Takes the step, and hands `Step` to the callbacks under the key 'step'."""
+        # Lightning calls this in the precision of the network, which is not that of its gradient.
+        with torch.autocast(self.device.type, enabled=False):
+            step = training_step(
+                batch,
+                self.learner,
+                optimizer=self._optimizer(),
+                precision=self.trainer.precision_plugin.forward_context,
+            )
+        return {"step": step}
 
-    def _losses(self, patches: Patches) -> tuple[Tensor, Tensor]:
-        inputs, target = self._example(patches)
-        prediction = self.network(*inputs)
-        return self.loss(prediction, target), prediction
+    def on_save_checkpoint(self, checkpoint: dict[str, Any]) -> None:
+        checkpoint[STEP_GUARD] = self.learner.guard.state_dict()
+
+    def on_load_checkpoint(self, checkpoint: dict[str, Any]) -> None:
+        self.learner.guard.load_state_dict(checkpoint[STEP_GUARD])
 
     def predict(self, buffers: Tensor, *inputs: Tensor) -> Tensor:
         """One image: buffers [H, W, C] and `Samples.test_inputs` to log1p radiance [H, W, 3].
@@ -134,7 +146,7 @@ class IlluminationModule(LightningModule):
         )
 
     def _optimizer(self) -> torch.optim.Optimizer:
-        optimizer = self.optimizers(use_pl_optimizer=False)
+        optimizer = self.optimizers()  # Lightning's, around ours: its `step` counts
         assert isinstance(optimizer, torch.optim.Optimizer)
         return optimizer
 

@@ -4,16 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from ngi.durable import full_disk_named
 from ngi.evaluate import Evaluation, Evaluator
-from ngi.evaluate.evaluator import Predict
-from ngi.learn.clock import PhaseClock, RunClock
-from ngi.learn.run_folder import RunFolder
-from ngi.learn.stream import TrainingStream
+from ngi.learn.run import Run
 from ngi.learn.target_map import TargetMap
-from ngi.learn.tracker import Tracker
-from ngi.learn.usage import usage
-from ngi.provenance import provenance
+from ngi.machine.provenance import provenance
+from ngi.machine.usage import usage
 
 
 class Recorder:
@@ -23,34 +18,18 @@ class Recorder:
     """
 
     def __init__(
-        self,
-        *,
-        evaluator: Evaluator,
-        target_map: TargetMap | None,
-        predict: Predict,
-        folder: RunFolder,
-        stream: TrainingStream,
-        clock: PhaseClock,
-        run_clock: RunClock,
-        tracker: Tracker,
-        label: dict[str, Any],
-        backend: str,
+        self, run: Run, *, evaluator: Evaluator, target_map: TargetMap | None, label: dict[str, Any]
     ) -> None:
+        self._run = run
         self._evaluator = evaluator
         self._target_map = target_map
-        self._predict = predict
-        self._folder = folder
-        self._stream = stream
-        self._clock = clock
-        self._run_clock = run_clock
-        self._tracker = tracker
+        self._predict = run.interruption.checked(run.module.predict)
         self._label = label
-        self._backend = backend
 
     def prepare(self) -> None:
         """Lets the tracker begin, and renders the reference images that are not cached yet."""
-        self._tracker.start(
-            folder=self._folder.path, settings=self._folder.settings, label=self._label
+        self._run.tracker.start(
+            folder=self._run.folder.path, settings=self._run.folder.settings, label=self._label
         )
         self._evaluator.prepare()
         if self._target_map is not None:
@@ -58,53 +37,54 @@ class Recorder:
 
     def evaluate(self) -> Evaluation:
         """Evaluates the network as it is, and appends a row to metrics.csv."""
-        with self._clock.phase("evaluate"):
+        with self._run.clock.phase("evaluate"):
             # Killed after this row and before the next checkpoint or the result, a resumed run
             # evaluates again.
-            for log in (self._folder.metrics, self._folder.target_maps):
-                log.keep_until(self._stream.counters.iteration - 1)
+            for log in (self._run.folder.metrics, self._run.folder.target_maps):
+                log.keep_until(self._run.stream.counters.iteration - 1)
             evaluation = self._evaluator.evaluate(self._predict)
             densities = None if self._target_map is None else self._target_map.measure()
         row: dict[str, Any] = {
-            "step": self._stream.counters.iteration,
-            "run_seconds": self._run_clock.run_seconds,
-            "wall_seconds": self._clock.run_seconds,
-            **{f"{name}_seconds": value for name, value in self._run_clock.seconds.items()},
-            "patches_traced": self._stream.counters.patches_traced,
-            "paths_traced": self._stream.counters.paths_traced,
-            **usage(self._folder.path),
+            "step": self._run.stream.counters.iteration,
+            "run_seconds": self._run.run_clock.run_seconds,
+            "wall_seconds": self._run.clock.run_seconds,
+            **{f"{name}_seconds": value for name, value in self._run.run_clock.seconds.items()},
+            "patches_traced": self._run.stream.counters.patches_traced,
+            "paths_traced": self._run.stream.counters.paths_traced,
+            **usage(self._run.folder.path),
             **evaluation.row(),
         }
-        self._folder.metrics.append(row)
-        self._folder.metrics.flush()
+        self._run.folder.metrics.append(row)
+        self._run.folder.metrics.flush()
         if densities is not None:
-            self._folder.target_maps.append(
+            self._run.folder.target_maps.append(
                 {"step": row["step"], "run_seconds": row["run_seconds"], **densities}
             )
-            self._folder.target_maps.flush()
-        self._tracker.log(row)
+            self._run.folder.target_maps.flush()
+        with self._run.clock.phase("evaluate"):
+            self._run.tracker.evaluated(row, evaluation)
         return evaluation
 
     def finish(self) -> dict[str, Any]:
         """The last evaluation, with pictures; writes and returns the result."""
         evaluation = self.evaluate()
-        with full_disk_named(self._folder.pictures):
-            evaluation.write_pictures(self._folder.pictures)
-        counters = self._stream.counters
+        folder = self._run.folder
+        linear = evaluation.write(folder.path, linear_megabytes=folder.linear_megabytes)
+        counters = self._run.stream.counters
         result = {
-            **provenance(backend=self._backend),
-            "identity": self._folder.identity,
+            **provenance(backend=self._run.renderer.description),
+            "identity": self._run.folder.identity,
             "finished": True,
             "label": self._label,
             "seed": self._label["seed"],
-            "config": self._folder.settings,
-            "clock": self._run_clock.name,
-            "seconds": dict(self._run_clock.seconds),
-            "run_seconds": self._run_clock.run_seconds,
-            "wall_seconds": self._clock.run_seconds,
-            "wall_seconds_by_phase": dict(self._clock.seconds),
-            "energy_joules": self._clock.energy.joules,
-            "energy_sources": self._clock.energy.sources,
+            "config": self._run.folder.settings,
+            "clock": self._run.run_clock.name,
+            "seconds": dict(self._run.run_clock.seconds),
+            "run_seconds": self._run.run_clock.run_seconds,
+            "wall_seconds": self._run.clock.run_seconds,
+            "wall_seconds_by_phase": dict(self._run.clock.seconds),
+            "energy_joules": self._run.clock.energy.joules,
+            "energy_sources": self._run.clock.energy.sources,
             "steps": counters.iteration,
             "generated_batches": counters.generated_batches,
             "scored_batches": counters.scored_batches,
@@ -115,8 +95,9 @@ class Recorder:
             "batches_refused": counters.batches_refused,
             "steps_refused": counters.steps_refused,
             "steps_scaled": counters.steps_scaled,
-            "non_finite_losses": self._stream.store.non_finite_losses,
-            "scene_hash": self._folder.settings["scene"]["hash"],
+            "non_finite_losses": self._run.stream.store.non_finite_losses,
+            "scene_hash": self._run.folder.settings["scene"]["hash"],
             **evaluation.result(),
+            "linear": linear,
         }
-        return self._folder.write_result(result)
+        return self._run.folder.write_result(result)

@@ -68,6 +68,8 @@ class PatchSamples:
         buffers say where the point is and which direction
     denoiser: takes the noise off newly traced radiance, or None
     traced_share: see `DenoisedJob`
+
+    components: which of v, [0, D), the network is given, in order
     Raises ValueError for a share that is none.
     """
 
@@ -88,8 +90,8 @@ class PatchSamples:
         self.dimensions = renderer.dimensions
         self.patch_size = renderer.patch_size
         left_out = slice(0, 0) if camera else renderer.camera_part
-        self._seen = [i for i in range(self.dimensions) if i not in _indices(left_out)]
-        self.network_dimensions = len(self._seen)
+        self.components = [i for i in range(self.dimensions) if i not in _indices(left_out)]
+        self.network_dimensions = len(self.components)
 
     def check_resolution(self, resolution: int) -> None:
         """See `Samples.check_resolution`."""
@@ -128,7 +130,7 @@ class PatchSamples:
     def _of(self, scene_vectors: Tensor) -> Tensor:
         if self.network_dimensions == self.dimensions:
             return scene_vectors
-        return scene_vectors[..., self._seen]
+        return scene_vectors[..., self.components]
 
 
 def patch_example(patches: Patches) -> Example:

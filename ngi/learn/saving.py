@@ -8,26 +8,18 @@ from typing import Any
 
 from tqdm import tqdm
 
-from ngi.durable import DamagedError, write_atomically
-from ngi.learn.budget import Budget
+from ngi.files.durable import DamagedError, write_atomically
 from ngi.learn.checkpoint import DECAYS_FROM, STREAM, read_checkpoint
-from ngi.learn.clock import PhaseClock, RunClock
-from ngi.learn.interruption import Interruption
 from ngi.learn.lightning_api import Callback, LightningModule, Trainer
-from ngi.learn.run_folder import RunFolder
-from ngi.learn.schedule import Schedule
-from ngi.learn.stream import TrainingStream
+from ngi.learn.run import Run
 
 log = logging.getLogger(__name__)
 
 
-def budget_used(budget: Budget, stream: TrainingStream, clock: RunClock) -> float:
-    """The part of the budget that is used up by now."""
-    return budget.fraction(steps=stream.counters.iteration, run_seconds=clock.run_seconds)
-
-
 class BudgetAndCheckpoint(Callback):
     """Shows progress, saves a checkpoint every so often, and ends the run when the budget is spent.
+
+    A signal that was deferred ends it after this step, with a checkpoint.
 
     Once the learning rate's schedule depends on how long the run is to be, the checkpoint of that
     step is kept too: a longer run goes on from it. The first step may be such a one; then there is
@@ -35,46 +27,27 @@ class BudgetAndCheckpoint(Callback):
 
     every_seconds: run time between checkpoints, by the wall clock
     every_steps: further checkpoints after so many steps; None for none
-    interruption: a signal that was deferred by it ends the run after this step, with a checkpoint
     """
 
-    def __init__(
-        self,
-        *,
-        budget: Budget,
-        schedule: Schedule,
-        stream: TrainingStream,
-        clock: PhaseClock,
-        run_clock: RunClock,
-        folder: RunFolder,
-        every_seconds: float,
-        every_steps: int | None,
-        interruption: Interruption,
-    ) -> None:
-        self._budget = budget
-        self._schedule = schedule
-        self._stream = stream
-        self._clock = clock
-        self._run_clock = run_clock
-        self._folder = folder
+    def __init__(self, run: Run, *, every_seconds: float, every_steps: int | None) -> None:
+        self._run = run
         self._every_seconds = every_seconds
         self._every_steps = every_steps
-        self._interruption = interruption
         self._saved_at = 0.0
         self._saved_step = 0
         self._decays_from: int | None = None  # the step after which the schedule's decay began
         self._bar: tqdm[Any] | None = None
 
     def on_train_start(self, trainer: Trainer, *_: Any) -> None:
-        used = budget_used(self._budget, self._stream, self._run_clock)
+        used = self._run.budget_used
         trainer.should_stop = used >= 1  # killed after its last step, before its result
-        self._saved_at = self._clock.run_seconds
-        self._saved_step = self._stream.counters.iteration
+        self._saved_at = self._run.clock.run_seconds
+        self._saved_step = self._run.stream.counters.iteration
         self._go_on_decaying(used)
         self._bar = tqdm(
             total=100,
             initial=100 * min(used, 1.0),
-            desc=self._folder.path.parent.name,
+            desc=self._run.folder.name,
             bar_format="{desc} {percentage:3.0f}%|{bar}| {elapsed}<{remaining}{postfix}",
             mininterval=1.0 if sys.stderr.isatty() else 15.0,
         )
@@ -82,22 +55,22 @@ class BudgetAndCheckpoint(Callback):
     def on_train_batch_end(
         self, trainer: Trainer, _module: LightningModule, outputs: Any, *_: Any
     ) -> None:
-        steps, seconds = self._stream.counters.iteration, self._clock.run_seconds
-        used = budget_used(self._budget, self._stream, self._run_clock)
-        self._show(min(used, 1.0), float(outputs["loss"]))
+        steps, seconds = self._run.stream.counters.iteration, self._run.clock.run_seconds
+        used = self._run.budget_used
+        self._show(min(used, 1.0), outputs["step"].loss)
         periodic = self._every_steps is not None and steps % self._every_steps == 0
-        decay_begins = self._decays_from is None and self._schedule.decays(used)
+        decay_begins = self._decays_from is None and self._run.schedule.decays(used)
         if decay_begins:
             self._decays_from = steps
         due = periodic or seconds - self._saved_at >= self._every_seconds
         if used >= 1 or decay_begins or due:
             if used < 1:  # nobody waits for patches that no step follows
-                self._stream.finish_rendering()
+                self._run.stream.finish_rendering()
             self._save(trainer)
         if decay_begins:
             self._keep_stable()
         trainer.should_stop = used >= 1
-        self._interruption.check()
+        self._run.interruption.check()
 
     def on_train_end(self, *_: Any) -> None:
         self._close()
@@ -108,20 +81,20 @@ class BudgetAndCheckpoint(Callback):
         if self._bar is None:
             return  # nothing is trained yet
         self._close()
-        step = self._stream.counters.iteration
+        step = self._run.stream.counters.iteration
         if isinstance(exception, SystemExit):  # a deferred signal: the step is complete
             if self._saved_step < step:
                 self._save(trainer)
-            log.warning("%s: interrupted, and saved at step %d", self._folder.path, step)
+            log.warning("%s: interrupted, and saved at step %d", self._run.folder.path, step)
 
     def _save(self, trainer: Trainer) -> None:
-        with self._clock.phase("checkpoint"):
-            for log_file in self._folder.logs:
+        with self._run.clock.phase("checkpoint"):
+            for log_file in self._run.folder.logs:
                 log_file.flush()
-            trainer.save_checkpoint(self._folder.checkpoint)
-            self._stream.prune_archive()
-        self._saved_at = self._clock.run_seconds
-        self._saved_step = self._stream.counters.iteration
+            trainer.save_checkpoint(self._run.folder.checkpoint)
+            self._run.stream.prune_archive()
+        self._saved_at = self._run.clock.run_seconds
+        self._saved_step = self._run.stream.counters.iteration
 
     def state_dict(self) -> dict[str, Any]:
         return {DECAYS_FROM: self._decays_from}
@@ -131,8 +104,8 @@ class BudgetAndCheckpoint(Callback):
 
     def _go_on_decaying(self, used: float) -> None:
         """What a resumed run has to know of the checkpoint before its decay."""
-        step, stable = self._stream.counters.iteration, self._folder.stable_checkpoint
-        if not self._schedule.decays(used):
+        step, stable = self._run.stream.counters.iteration, self._run.folder.stable_checkpoint
+        if not self._run.schedule.decays(used):
             self._decays_from = None  # it is trained longer
         elif step == 0:
             self._decays_from = 0
@@ -141,22 +114,23 @@ class BudgetAndCheckpoint(Callback):
             self._keep_stable()
         elif stable.exists():
             try:
-                self._stream.keep(read_checkpoint(stable)[STREAM])
+                self._run.stream.keep(read_checkpoint(stable)[STREAM])
             except DamagedError as error:
                 log.warning("%s; this run can not be trained longer later on", error)
 
     def _keep_stable(self) -> None:
-        with self._clock.phase("checkpoint"):
-            content = self._folder.checkpoint.read_bytes()
-            write_atomically(self._folder.stable_checkpoint, content)
-        self._stream.keep()
+        with self._run.clock.phase("checkpoint"):
+            content = self._run.folder.checkpoint.read_bytes()
+            write_atomically(self._run.folder.stable_checkpoint, content)
+        self._run.stream.keep()
 
     def _show(self, used: float, loss: float) -> None:
         assert self._bar is not None
-        counters = self._stream.counters
+        stream = self._run.stream
         self._bar.set_postfix_str(
-            f"step {counters.iteration}, loss {loss:.4f}, "
-            f"{counters.patches_traced} patches traced, reuse {self._stream.reuse_probability:.2f}",
+            f"step {stream.counters.iteration}, loss {loss:.4f}, "
+            f"{stream.counters.patches_traced} patches traced, "
+            f"reuse {stream.reuse_probability:.2f}",
             refresh=False,
         )
         self._bar.update(100 * used - self._bar.n)

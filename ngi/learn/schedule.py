@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Protocol
 
-from ngi.learn.budget import Budget
+from ngi.clock.budget import Budget
 
 
 class Schedule(Protocol):

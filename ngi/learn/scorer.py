@@ -15,8 +15,8 @@ from dataclasses import fields
 import torch
 from torch import Tensor, nn
 
+from ngi.clock.phase_clock import PhaseClock
 from ngi.explore import Signals, Target
-from ngi.learn.clock import PhaseClock
 from ngi.learn.samples import Example
 from ngi.models import (
     SampleLoss,

@@ -15,16 +15,15 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Iterable
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
 import torch
 from torch import Tensor, nn
 
-from ngi.durable import write_tensors
+from ngi.files.durable import write_tensors
 from ngi.learn.batch import Batch
-from ngi.learn.lightning_api import Callback, LightningModule, Trainer
 from ngi.learn.stream import TrainingStream
 
 log = logging.getLogger(__name__)
@@ -45,13 +44,39 @@ REFUSED_IN_A_ROW = 10
 """Steps after which no other batch will help: the run stops."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Attempt:
+    """A step up to its backward pass.
+
+    losses: [n] of the batch's samples; loss: their weighted mean. Both without a graph, and not
+        looked at before the guard does: a GPU would be waited for.
+    """
+
+    batch: Batch
+    losses: Tensor
+    loss: Tensor
+    network: nn.Module
+    optimizer: torch.optim.Optimizer
+
+    def content(self) -> dict[str, Any]:
+        """What it takes to do it again."""
+        patches = self.batch.patches.to("cpu")
+        return {
+            "weights": self.network.state_dict(prefix="network."),
+            "optimizer": self.optimizer.state_dict(),
+            "patches": {f.name: getattr(patches, f.name) for f in fields(patches)},
+            "losses": self.losses,
+            "loss_weights": self.batch.loss_weights,
+        }
+
+
 def gradient_norm(parameters: Iterable[nn.Parameter]) -> float:
     """L2 norm of the whole gradient; NaN or Inf where a part of it is so."""
     gradients = [p.grad for p in parameters if p.grad is not None]
     return float(torch.nn.utils.get_total_norm(gradients)) if gradients else 0.0
 
 
-class StepGuard(Callback):
+class StepGuard:
     """Takes back the gradient of a step that would harm weights or moments: it then does nothing.
 
     A gradient far larger than the average is scaled down to it, and the step is taken.
@@ -65,7 +90,6 @@ class StepGuard(Callback):
     """
 
     def __init__(self, *, stream: TrainingStream, folder: Path) -> None:
-        self.gradient_norm = 0.0
         self._stream = stream
         self._report = folder / REPORT
         self._in_a_row = 0
@@ -77,86 +101,68 @@ class StepGuard(Callback):
     def load_state_dict(self, state_dict: dict[str, Any]) -> None:
         self._log_norm = state_dict["log_norm"]
 
-    def on_before_backward(self, _trainer: Trainer, _module: LightningModule, loss: Tensor) -> None:
-        self._loss = loss.detach()  # not looked at yet: a GPU would be waited for
+    def admit(self, attempt: Attempt) -> float:
+        """Between the backward pass and the optimiser's step; the L2 norm that the gradient had.
 
-    def on_before_optimizer_step(
-        self, _trainer: Trainer, module: LightningModule, optimizer: torch.optim.Optimizer
-    ) -> None:
-        self.gradient_norm = gradient_norm(module.parameters())
-        gradient_usable = self.gradient_norm <= LARGEST_NORM  # not for NaN
-        moments_usable = math.isfinite(_largest_moment(optimizer))
-        self._harmless = gradient_usable and moments_usable and math.isfinite(self._loss)
-        if self._harmless:
-            self._scale_down(module)
-            return
-        self._unusable = [name for name, p in module.named_parameters() if not _usable(p.grad)]
-        self._moments_usable = moments_usable
-        optimizer.zero_grad(set_to_none=True)
-
-    def on_train_batch_end(
-        self, trainer: Trainer, module: LightningModule, outputs: Any, batch: Batch, *_: Any
-    ) -> None:
-        """Raises FloatingPointError for one refusal too many."""
-        if self._harmless:
+        Raises FloatingPointError for one refusal too many.
+        """
+        norm = gradient_norm(attempt.network.parameters())
+        moments_usable = math.isfinite(_largest_moment(attempt.optimizer))
+        # `<=` is not so for NaN.
+        if norm <= LARGEST_NORM and moments_usable and math.isfinite(attempt.loss):
             self._in_a_row = 0
-            return
+            self._scale_down(attempt.network, norm)
+        else:
+            self._refuse(attempt, _cause(attempt, norm, moments_usable=moments_usable))
+        return norm
+
+    def _refuse(self, attempt: Attempt, cause: str) -> None:
+        attempt.optimizer.zero_grad(set_to_none=True)
         self._in_a_row += 1
         self._stream.counters.steps_refused += 1
-        cause = self._cause(outputs["feedback"].losses, batch)
         step = self._stream.counters.iteration + 1
         log.warning("step %d is not taken: %s", step, cause)
         if self._in_a_row < REFUSED_IN_A_ROW:
             return
-        self._write(trainer, module, outputs, batch, cause)
+        write_tensors(self._report, {"cause": cause, "step": step, **attempt.content()})
         raise FloatingPointError(
             f"step {step} is the {REFUSED_IN_A_ROW}th in a row that is not taken: {cause}. "
             f"Weights, moments and batch are in {self._report}. The usual remedy is a lower "
             "optimizer.lr, in a new folder, since that is another run"
         )
 
-    def _scale_down(self, module: LightningModule) -> None:
-        if self.gradient_norm == 0:
+    def _scale_down(self, network: nn.Module, norm: float) -> None:
+        if norm == 0:
             return
-        log_norm = math.log(self.gradient_norm)
+        log_norm = math.log(norm)
         average = log_norm if self._log_norm is None else self._log_norm
         self._log_norm = average + (log_norm - average) / AVERAGED
         if log_norm - average <= math.log(OUTLIER):
             return
         self._stream.counters.steps_scaled += 1
-        for parameter in module.parameters():
+        for parameter in network.parameters():
             if parameter.grad is not None:
                 parameter.grad.mul_(math.exp(average - log_norm))
 
-    def _cause(self, losses: Tensor, batch: Batch) -> str:
-        broken = (~losses.isfinite()).nonzero().flatten().tolist()
-        if broken:
-            return (
-                f"the loss of samples {broken} (patches {batch.ids[broken].tolist()} of the store) "
-                f"is {losses[broken].tolist()}"
-            )
-        if not self._moments_usable:
-            return "the optimiser's moments hold NaN or Inf, which no gradient brought there"
-        return (
-            f"the gradient has the norm {self.gradient_norm:.3g}, from "
-            f"{', '.join(self._unusable[:3]) or 'all weights together'} on, at losses up to "
-            f"{losses.max().item():.3g}"
-        )
 
-    def _write(
-        self, trainer: Trainer, module: LightningModule, outputs: Any, batch: Batch, cause: str
-    ) -> None:
-        patches = batch.patches.to("cpu")
-        content = {
-            "cause": cause,
-            "step": self._stream.counters.iteration + 1,
-            "weights": module.state_dict(),
-            "optimizer": trainer.optimizers[0].state_dict(),
-            "patches": {f.name: getattr(patches, f.name) for f in fields(patches)},
-            "losses": outputs["feedback"].losses,
-            "loss_weights": batch.loss_weights,
-        }
-        write_tensors(self._report, content)
+def _cause(attempt: Attempt, norm: float, *, moments_usable: bool) -> str:
+    """Of a step that is not taken."""
+    losses, batch = attempt.losses, attempt.batch
+    broken = (~losses.isfinite()).nonzero().flatten().tolist()
+    if broken:
+        return (
+            f"the loss of samples {broken} (patches {batch.ids[broken].tolist()} of the store) "
+            f"is {losses[broken].tolist()}"
+        )
+    if not moments_usable:
+        return "the optimiser's moments hold NaN or Inf, which no gradient brought there"
+    named = attempt.network.named_parameters(prefix="network")
+    unusable = [name for name, parameter in named if not _usable(parameter.grad)]
+    return (
+        f"the gradient has the norm {norm:.3g}, from "
+        f"{', '.join(unusable[:3]) or 'all weights together'} on, at losses up to "
+        f"{losses.max().item():.3g}"
+    )
 
 
 def _usable(gradient: Tensor | None) -> bool:

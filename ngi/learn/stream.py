@@ -17,11 +17,12 @@ import numpy as np
 import torch
 from torch.utils.data import IterableDataset
 
-from ngi.explore import ChainInfo, ChainState, MarkovChains, ResolutionSchedule
+from ngi.clock.counters import Counters
+from ngi.clock.phase_clock import PhaseClock
+from ngi.explore import ChainInfo, ChainState, ResolutionSchedule, Sampler
 from ngi.learn.ahead import ProposalsAhead
-from ngi.learn.batch import Batch, Counters, Feedback
+from ngi.learn.batch import Batch, Feedback
 from ngi.learn.chain_trace import chain_record
-from ngi.learn.clock import PhaseClock
 from ngi.learn.samples import Samples
 from ngi.reuse import PatchArchive, PatchStore, ReusePolicy
 
@@ -56,7 +57,7 @@ class TrainingStream(IterableDataset[Batch]):
         self,
         *,
         samples: Samples,
-        sampler: MarkovChains,
+        sampler: Sampler,
         store: PatchStore,
         archive: PatchArchive,
         policy: ReusePolicy,
@@ -80,6 +81,7 @@ class TrainingStream(IterableDataset[Batch]):
             )
         self.sampler = sampler
         self.store = store
+        self.clock = clock
         self.counters = Counters()
         self.reuse_probability = 0.0
         self.chain_record: dict[str, np.ndarray] | None = None  # of a generated batch
@@ -88,7 +90,6 @@ class TrainingStream(IterableDataset[Batch]):
         self._archive = archive
         self._policy = policy
         self._schedule = schedule
-        self._clock = clock
         self._when_late = when_late
         self._generator = torch.Generator().manual_seed(seed)
         self._chains: ChainState = sampler.init(samples.dimensions + 2)
@@ -120,11 +121,11 @@ class TrainingStream(IterableDataset[Batch]):
             raise RuntimeError("feedback without a batch")
         batch, self._pending = self._pending, None
         losses = feedback.losses.detach().float().cpu()
-        with self._clock.phase("explore"):
+        with self.clock.phase("explore"):
             self._chain_info = self.chain_record = None
             if batch.generated:
-                self._accept(batch, feedback)
-        with self._clock.phase("reuse"):
+                self._accept(batch, feedback, losses)
+        with self.clock.phase("reuse"):
             self.store.update(batch.ids.cpu(), losses)
             self._policy_state = self._policy.update(
                 self._policy_state,
@@ -140,7 +141,7 @@ class TrainingStream(IterableDataset[Batch]):
         They would go on rendering in time that does not count.
         """
         if self._ahead is not None and self._ahead.late:
-            with self._clock.phase("render"):
+            with self.clock.phase("render"):
                 self._ahead.result()
 
     def log_row(self) -> dict[str, float | int | None]:
@@ -177,7 +178,7 @@ class TrainingStream(IterableDataset[Batch]):
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         self.counters = Counters(**state["counters"])
-        self._chains = ChainState.from_state_dict(state["chains"])
+        self._chains = type(self._chains).from_state_dict(state["chains"])
         self._policy_state = type(self._policy_state).from_state_dict(state["policy"])
         self._generator.set_state(state["generator"])
         ahead = state["ahead"]
@@ -198,7 +199,7 @@ class TrainingStream(IterableDataset[Batch]):
 
     def _next(self) -> Batch:
         ahead = self._propose()
-        with self._clock.phase("reuse"):
+        with self.clock.phase("reuse"):
             self.reuse_probability = self._policy.probability(
                 self._policy_state,
                 generated_batches=self.counters.generated_batches,
@@ -223,7 +224,7 @@ class TrainingStream(IterableDataset[Batch]):
         What is drawn, and when, does not depend on where and how fast it is rendered.
         """
         if self._ahead is None:
-            with self._clock.phase("explore"):
+            with self.clock.phase("explore"):
                 self._ahead = ProposalsAhead(
                     self.sampler.propose(
                         self._chains, self._generator, batch=self.counters.proposed_batches
@@ -232,7 +233,7 @@ class TrainingStream(IterableDataset[Batch]):
                     seed=int(torch.randint(2**31, (), generator=self._generator)),
                 )
         self._resolution = self._ahead.resolution
-        with self._clock.phase("render"):
+        with self.clock.phase("render"):
             self._ahead.start(self._samples)
         return self._ahead
 
@@ -244,13 +245,14 @@ class TrainingStream(IterableDataset[Batch]):
     def _generate(self, ahead: ProposalsAhead) -> Batch:
         ahead = self._usable(ahead)
         self.counters.count_generated(ahead.result())
-        with self._clock.phase("reuse"):
-            ids = self.store.add(ahead.patches())
+        with self.clock.phase("reuse"):
+            ids = self.store.add(ahead.patches(), ahead.proposals.weight)
             patches = self.store.get(ids)  # in the precision of every later look at them
             score_current = self.sampler.needs_current and bool(self._chains.occupied.all())
             current = self.store.get(self._chains.patch) if score_current else None
         self.counters.scored_batches += score_current
-        return Batch(patches, ids, generated=True, current=current)
+        weights = ahead.proposals.weight
+        return Batch(patches, ids, generated=True, current=current, loss_weights=weights)
 
     def _usable(self, ahead: ProposalsAhead) -> ProposalsAhead:
         """The proposals, rendered, or others where the patches of these hold NaN or Inf.
@@ -258,7 +260,7 @@ class TrainingStream(IterableDataset[Batch]):
         Raises FloatingPointError where others do not help.
         """
         for _ in range(REFUSED_IN_A_ROW):
-            with self._clock.phase("render"):
+            with self.clock.phase("render"):
                 problem = ahead.unusable()
             if problem is None:
                 return ahead
@@ -271,23 +273,23 @@ class TrainingStream(IterableDataset[Batch]):
             "usable patches of this scene"
         )
 
-    def _accept(self, batch: Batch, feedback: Feedback) -> None:
+    def _accept(self, batch: Batch, feedback: Feedback, losses: torch.Tensor) -> None:
         assert self._ahead is not None
         unscored = torch.zeros(self.sampler.chains)  # looked at by no rule
         proposed, current = feedback.target_proposed, feedback.target_current
-        scored = unscored if proposed is None else proposed()
         self._chains, self._chain_info = self.sampler.accept(
             self._chains,
             self._ahead.proposals,
             batch.ids,
             target_current=unscored if current is None else current,
-            target_proposed=scored,
+            target_proposed=unscored if proposed is None else proposed,
             generator=self._generator,
+            losses=losses,
         )
         self.chain_record = chain_record(
             self._ahead.proposals,
             self._chain_info,
-            target_proposed=None if proposed is None else scored,
+            target_proposed=proposed,
             target_current=current,
         )
         self._ahead = None

@@ -18,13 +18,6 @@ from ngi.reuse import CompactPatches
 PATCHES_AT_ONCE = 16
 """Rendered and scored together: as many as in a batch of training."""
 
-DESCRIPTION = (
-    "One record per evaluation; step and run_seconds as in metrics.csv. state [g, g, k, 4]: k "
-    "patches in each of g x g cells of [0, 1]^2, scene variables and then patch position, the same "
-    "in every record; the first index is the cell along the first scene variable. loss, target "
-    "[g, g, k]: their training loss and target density."
-)
-
 SignalsOf = Callable[[Patches, Target], Signals]
 """What the network, as it is now, says about [n] patches, as far as the target requires it."""
 
@@ -80,7 +73,10 @@ class TargetMap:
                 progress.update(len(chunk))
 
     def measure(self) -> dict[str, np.ndarray]:
-        """`state`, and `loss` and `target` under the present weights; see `DESCRIPTION`."""
+        """`state`, and `loss` and `target` under the present weights.
+
+        See `ngi.files.records.TARGET_MAPS`.
+        """
         self.prepare()
         signals = [self._signals(patches.expand(), self._target) for patches in self._patches]
         return {

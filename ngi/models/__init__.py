@@ -1,8 +1,6 @@
 """The neural renderer, its loss, and what it says about single samples. PyTorch only."""
 
-from ngi.models.anf import AffinityDenoiser
 from ngi.models.averaging import Averaging, exponential_average, no_average
-from ngi.models.cnsr import CNSR
 from ngi.models.encoded_generator import EncodedGenerator
 from ngi.models.image_layers import ImageLinear
 from ngi.models.loss import L1Dssim, SampleLoss
@@ -14,11 +12,8 @@ from ngi.models.sample_signals import (
     sample_step_norm,
     step_norms_in_backward,
 )
-from ngi.models.sequence_loss import SequenceSmape
 
 __all__ = [
-    "CNSR",
-    "AffinityDenoiser",
     "Averaging",
     "EncodedGenerator",
     "ImageLinear",
@@ -27,7 +22,6 @@ __all__ = [
     "PatchLinear",
     "PixelGenerator",
     "SampleLoss",
-    "SequenceSmape",
     "exponential_average",
     "no_average",
     "output_gradient_norm",

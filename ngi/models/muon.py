@@ -8,12 +8,14 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
+from ngi.models.batched_muon import BatchedMuon
+
 SMALLEST_SIDE = 9
 """Rows and columns from which on a weight is a matrix to Muon. Below that, an output of three
 channels for example, there are hardly any directions to be made equal."""
 
 RULES: dict[str, Callable[[list[dict[str, Any]]], torch.optim.Optimizer]] = {
-    "muon": torch.optim.Muon,
+    "muon": BatchedMuon,
     "adam": torch.optim.Adam,
 }
 """What steps the parameters of a group, by its entry `rule`."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import torch
@@ -11,7 +12,8 @@ from torch import Tensor, nn
 from torch.autograd.function import once_differentiable
 
 SampleGradients = Callable[[Tensor, Tensor], None]
-"""Is shown the gradients of a weight and a bias for each sample, [n, out, in] and [n, out]."""
+"""Is shown a parameter and its gradients for n samples, [n, *parameter.shape]. Where it is called
+again for the same parameter, they are those of further samples of the same batch, in order."""
 
 
 class PatchLinear(nn.Linear):
@@ -23,8 +25,8 @@ class PatchLinear(nn.Linear):
     patch. (The release repeats v at every pixel.)
 
     weight: [out_features, sum(pixel_features) + scene_dimensions]; bias: [out_features]
-    watcher: while set, the backward pass forms the gradients of each sample, in the precision of
-        the products, shows them to it and sums them up to those of the batch
+    watcher: while set at the forward pass, the backward pass forms the gradients of each sample,
+        in the precision of the products, shows them to it and sums them up to those of the batch
     """
 
     def __init__(
@@ -62,7 +64,7 @@ class _Watched(torch.autograd.Function):
         bias: Tensor,
         *inputs: Tensor,
     ) -> Tensor:
-        ctx.watcher = watcher
+        ctx.show_weights, ctx.show_biases = partial(watcher, weight), partial(watcher, bias)
         ctx.save_for_backward(weight, *inputs)
         *pixels, scene_vector = inputs
         return _patch_linear(weight, bias, scene_vector, pixels)
@@ -73,7 +75,8 @@ class _Watched(torch.autograd.Function):
         weight, *pixels, scene_vector = ctx.saved_tensors
         biases = gradient.sum(dim=1).to(weight.dtype)
         weights = _sample_gradients(gradient, biases, scene_vector, pixels)
-        ctx.watcher(weights, biases)
+        ctx.show_weights(weights)
+        ctx.show_biases(biases)
         of_inputs = [
             of_output @ columns.to(of_output.dtype) if needed else None
             for of_output, columns, needed in zip(

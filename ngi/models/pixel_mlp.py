@@ -1,14 +1,15 @@
 """A multilayer perceptron over pixels, with its own forward and backward pass.
 
-PyTorch's layers write every intermediate result of a whole batch to memory and read it again, and
-a network as small as ours then waits for memory most of the time. Here a few thousand pixels at a
-time go through all layers, so that their features stay in the processor's caches; the inputs are
-joined once, and each layer is one product with its bias and activation fused.
+A network as small as ours waits for memory most of the time: every pass over the features of a
+batch that can be saved counts. The inputs are joined once, each layer is one product with its bias
+and activation fused, and what the first layer adds to all pixels of a patch is a column of its
+weight, so that neither it nor its gradient takes a pass of its own.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import torch
@@ -16,10 +17,9 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 from torch.autograd.function import once_differentiable
 
-from ngi.models.image_layers import computed_by_onednn
+from ngi.models.image_layers import ALIGNMENT, computed_by_onednn
+from ngi.models.patch_linear import SampleGradients
 
-CACHED_PIXELS = 2_048
-"""That go through all layers together on a CPU."""
 NEGATIVE_SLOPE = 0.01
 """Of the leaky ReLUs, as in the release."""
 
@@ -33,6 +33,7 @@ class PixelMLP(nn.Module):
     pixel_features: I, numbers per pixel
     patch_features: D, numbers per patch; may be 0
     hidden_layers: number of layers with an activation
+    watcher: see `PatchLinear`
     """
 
     def __init__(
@@ -45,6 +46,7 @@ class PixelMLP(nn.Module):
         out_features: int,
     ) -> None:
         super().__init__()
+        self.watcher: SampleGradients | None = None
         self.skip = (hidden_layers + 1) // 2  # the layer that sees the pixel again
         first = nn.Linear(pixel_features + patch_features, hidden_features)
         of_pixels, of_patch = first.weight.detach().split([pixel_features, patch_features], dim=1)
@@ -69,102 +71,126 @@ class PixelMLP(nn.Module):
         gradient reaches the weights and `patch`, and `pixels` where they want one.
         """
         patch_bias = F.linear(patch, self.patch_weight, self.patch_bias)
-        arguments = (pixels.flatten(0, 1), patch_bias, self.skip, *self.weights, *self.biases)
+        arguments = (pixels, patch_bias, self.skip, *self.weights, *self.biases)
         if torch.is_grad_enabled():
-            output = _Layers.apply(*arguments)
+            if self.watcher is not None:
+                patch_bias.register_hook(partial(self._show_of_patches, self.watcher, patch))
+            output = _Layers.apply(self.watcher, *arguments)
         else:
             output, _, _ = _forward(*arguments)
         assert isinstance(output, Tensor)
         return output.unflatten(0, pixels.shape[:2])
 
+    def _show_of_patches(self, watcher: SampleGradients, patch: Tensor, g: Tensor) -> None:
+        """g: gradient of each patch's bias in the first layer, [n, H]; patch: [n, D]."""
+        watcher(self.patch_bias, g)
+        watcher(self.patch_weight, g[:, :, None] * patch.detach()[:, None])
+
 
 class _Layers(torch.autograd.Function):
-    """`_forward`, with a backward pass that goes through the same chunks of pixels."""
+    """`_forward` with its backward pass."""
 
     @staticmethod
     def forward(
-        ctx: Any, pixels: Tensor, patch_bias: Tensor, skip: int, *parameters: Tensor
+        ctx: Any,
+        watcher: SampleGradients | None,
+        pixels: Tensor,
+        patch_bias: Tensor,
+        skip: int,
+        *parameters: Tensor,
     ) -> Tensor:
         output, weights, inputs = _forward(pixels, patch_bias, skip, *parameters)
-        ctx.skip, ctx.layers, ctx.dtype = skip, len(weights), parameters[0].dtype
-        ctx.save_for_backward(pixels, patch_bias, *weights, *inputs)
+        ctx.watcher, ctx.parameters, ctx.skip = watcher, parameters, skip
+        ctx.shape = pixels.shape
+        ctx.save_for_backward(*weights, *inputs)
         return output
 
     @staticmethod
     @once_differentiable
     def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor | None, ...]:
-        pixels, patch_bias, *saved = ctx.saved_tensors
-        weights, inputs = saved[: ctx.layers], saved[ctx.layers :]
+        layers = len(ctx.saved_tensors) // 2
+        weights, inputs = ctx.saved_tensors[:layers], ctx.saved_tensors[layers:]
+        patches, _, pixel_features = ctx.shape
         hidden = len(weights[0])
-        of_weights = [torch.zeros_like(weight, dtype=ctx.dtype) for weight in weights]
-        of_biases = [weight.new_zeros(len(weight)) for weight in of_weights[1:]]
-        of_patches, of_pixels = [], []
-        chunks = _chunks(patch_bias, pixels, gradient.to(pixels.dtype))
-        for index, (bias, part, g) in enumerate(chunks):
-            of_part: Tensor | None = None
-            for number in range(ctx.layers - 1, 0, -1):
-                weight = weights[number]
-                features = inputs[index * (ctx.layers - 1) + number - 1]
-                of_weights[number] += g.mT @ features
-                of_biases[number - 1] += g.sum(dim=0)
-                if number == ctx.skip and ctx.needs_input_grad[0]:
-                    of_part = g @ weight[:, hidden:]
-                g = torch.ops.aten.leaky_relu_backward(
-                    g @ weight[:, :hidden], features[:, :hidden], NEGATIVE_SLOPE, True
-                )
-            of_weights[0] += g.mT @ part
-            of_patches.append(g.unflatten(0, (len(bias), -1)).sum(dim=1, dtype=ctx.dtype))
-            if ctx.needs_input_grad[0]:
-                assert of_part is not None
-                of_pixels.append(of_part.add_(g @ weights[0]))
-        return (
-            torch.cat(of_pixels) if of_pixels else None,
-            torch.cat(of_patches).to(patch_bias.dtype),
-            None,
-            *of_weights,
-            *of_biases,
-        )
+        of_weights, of_biases = [], []
+        of_pixels: Tensor | None = None
+        g = gradient.to(weights[0].dtype)
+        for number in range(layers - 1, 0, -1):
+            weight, bias = (ctx.parameters[i] for i in (number, layers + number - 1))
+            of_biases.append(_of_bias(g, bias, patches, ctx.watcher))
+            of_weights.append(_of_weight(g, inputs[number], weight, patches, ctx.watcher))
+            if number == ctx.skip and ctx.needs_input_grad[1]:
+                of_pixels = g @ weights[number][:, hidden:]
+            g = torch.ops.aten.leaky_relu_backward(
+                g @ weights[number][:, :hidden],
+                inputs[number][:, :hidden],  # what came out of the activation
+                NEGATIVE_SLOPE,
+                True,
+            )
+        of_first = _of_weight(g, inputs[0], ctx.parameters[0], patches, ctx.watcher)
+        of_weights.append(of_first[:, :pixel_features])
+        of_patches = of_first[:, pixel_features : pixel_features + patches].mT
+        if of_pixels is not None:
+            of_pixels = (of_pixels + g @ weights[0][:, :pixel_features]).view(ctx.shape)
+        return None, of_pixels, of_patches, None, *reversed(of_weights), *reversed(of_biases)
+
+
+def _of_weight(
+    g: Tensor, features: Tensor, weight: Tensor, patches: int, watcher: SampleGradients | None
+) -> Tensor:
+    """Gradient [out, in] of a weight, from g, that of its layer's output, [n·p, out].
+
+    features: what the layer was given, [n·p, in]; of a first layer they are more than the weight's
+    """
+    if watcher is None:
+        return (g.mT @ features).to(weight.dtype)
+    of_samples = (_per_patch(g, patches).mT @ _per_patch(features, patches)).to(weight.dtype)
+    watcher(weight, of_samples[..., : weight.shape[1]])
+    return of_samples.sum(dim=0)
+
+
+def _of_bias(g: Tensor, bias: Tensor, patches: int, watcher: SampleGradients | None) -> Tensor:
+    """Gradient [out] of a bias."""
+    if watcher is None:
+        return g.sum(dim=0).to(bias.dtype)
+    of_samples = _per_patch(g, patches).sum(dim=1).to(bias.dtype)
+    watcher(bias, of_samples)
+    return of_samples.sum(dim=0)
+
+
+def _per_patch(rows: Tensor, patches: int) -> Tensor:
+    return rows.unflatten(0, (patches, -1))
 
 
 def _forward(
     pixels: Tensor, patch_bias: Tensor, skip: int, *parameters: Tensor
 ) -> tuple[Tensor, list[Tensor], list[Tensor]]:
-    """Pixels [n·p, I] to [n·p, out], with what a backward pass needs.
+    """Pixels [n, p, I] to [n·p, out], with what a backward pass needs.
 
     patch_bias: [n, H], of the first layer
     parameters: weights of all layers, then biases of all but the first
 
-    That is: the weights in the precision of the pixels, and, chunk by chunk, what each layer but
-    the first was given.
+    That is: the weights in the precision of the pixels, and what each layer was given. The first
+    one's weight has a column for the bias of every patch, and a pixel has a 1 where its patch's is.
     """
     layers = (len(parameters) + 1) // 2
-    weights = [weight.to(pixels.dtype) for weight in parameters[:layers]]
-    biases = [bias.to(pixels.dtype) for bias in parameters[layers:]]
-    outputs, inputs = [], []
-    for bias, part in _chunks(patch_bias.to(pixels.dtype), pixels):
-        features = F.linear(part, weights[0]).unflatten(0, (len(bias), -1))
-        features = F.leaky_relu_(features.add_(bias[:, None]), NEGATIVE_SLOPE).flatten(0, 1)
-        for number in range(1, layers):
-            if number == skip:
-                features = torch.cat([features, part], dim=1)
-            inputs.append(features)
-            features = _layer(
-                features, weights[number], biases[number - 1], activated=number < layers - 1
-            )
-        outputs.append(features)
-    return torch.cat(outputs), weights, inputs
+    first, *weights = [weight.to(pixels.dtype) for weight in parameters[:layers]]
+    biases = [None, *(bias.to(pixels.dtype) for bias in parameters[layers:])]
+    patches, size, width = pixels.shape
+    columns = F.pad(patch_bias.mT.to(pixels.dtype), (0, -(width + patches) % ALIGNMENT))
+    weights.insert(0, torch.cat([first, columns], dim=1))
+    own = torch.eye(patches, columns.shape[1], dtype=pixels.dtype, device=pixels.device)
+    inputs = []
+    features = torch.cat([pixels, own[:, None].expand(-1, size, -1)], dim=-1).flatten(0, 1)
+    for number, (weight, bias) in enumerate(zip(weights, biases, strict=True)):
+        if number == skip:
+            features = torch.cat([features, pixels.flatten(0, 1)], dim=1)
+        inputs.append(features)
+        features = _layer(features, weight, bias, activated=number < layers - 1)
+    return features, weights, inputs
 
 
-def _chunks(patch_bias: Tensor, *of_pixels: Tensor) -> Iterator[tuple[Tensor, ...]]:
-    """Biases [m, H] of m whole patches at a time, and the rows of the others for their pixels."""
-    patches = len(patch_bias)
-    size = len(of_pixels[0]) // patches
-    together = max(1, CACHED_PIXELS // size) if patch_bias.device.type == "cpu" else patches
-    rows = [tensor.split(together * size) for tensor in of_pixels]
-    return zip(patch_bias.split(together), *rows, strict=True)
-
-
-def _layer(features: Tensor, weight: Tensor, bias: Tensor, *, activated: bool) -> Tensor:
+def _layer(features: Tensor, weight: Tensor, bias: Tensor | None, *, activated: bool) -> Tensor:
     if features.device.type == "cpu" and computed_by_onednn(features.dtype):
         after: tuple[str, Sequence[float]] = ("none", [])
         if activated:

@@ -12,8 +12,9 @@ import torch
 from torch import Tensor, nn
 
 from ngi.models.loss import SampleLoss
-from ngi.models.patch_linear import PatchLinear, SampleGradients
-from ngi.models.step_rules import StepRules
+from ngi.models.patch_linear import PatchLinear
+from ngi.models.pixel_mlp import PixelMLP
+from ngi.models.step_rules import Step, StepRules
 
 
 def output_gradient_norm(prediction: Tensor, target: Tensor, loss: SampleLoss) -> Tensor:
@@ -43,7 +44,8 @@ def sample_step_norm(
     the network once per sample, and takes 1 for the norm before the first step, where this takes
     the true norm.
 
-    model: a network all of whose parameters belong to `PatchLinear` layers, each called once
+    model: a network all of whose parameters belong to `PatchLinear` layers or a `PixelMLP`, each
+        called once
     optimizer: `torch.optim.Adam` or `MuonAdam` over all parameters of the model
     inputs: the network's arguments, such as buffers [n, P, P, C] and v [n, D]
     target: [n, P, P, 3] log1p radiance as rendered
@@ -60,7 +62,7 @@ def sample_step_norm(
         losses = loss(model(*inputs), target)
         total = losses.sum()
     with torch.autocast(target.device.type, enabled=False):
-        torch.autograd.grad(total, [layer.bias for layer in _patch_linear_layers(model)])
+        torch.autograd.grad(total, list(model.parameters()))
     return losses.detach(), step_norms()
 
 
@@ -86,40 +88,39 @@ def step_norms_in_backward(
 
     Raises as `sample_step_norm`.
     """
-    layers = _patch_linear_layers(model)
+    parts = _watched_parts(model)
     rules = StepRules(optimizer)
     if not all(parameter in rules for parameter in model.parameters()):
         raise ValueError(
             "the optimizer does not hold every parameter of the model it is asked about"
         )
-    squared_norms: list[Tensor] = []
+    steps: dict[Tensor, Step] = {}
+    squared_norms: dict[Tensor, list[Tensor]] = {}
 
-    def watcher(layer: PatchLinear) -> SampleGradients:
-        def add_squared_norms(*gradients: Tensor) -> None:
-            with around(), torch.no_grad():
-                for parameter, g in zip((layer.weight, layer.bias), gradients, strict=True):
-                    step = rules.step(parameter).scaled(gradient_scale)
-                    squared_norms.append(step.squared_norm(g))
+    def add_squared_norms(parameter: Tensor, gradients: Tensor) -> None:
+        with around(), torch.no_grad():
+            if parameter not in steps:
+                steps[parameter] = rules.step(parameter).scaled(gradient_scale)
+            norms = steps[parameter].squared_norm(gradients)
+            squared_norms.setdefault(parameter, []).append(norms)
 
-        return add_squared_norms
-
-    for layer in layers:
-        layer.watcher = watcher(layer)
+    for part in parts:
+        part.watcher = add_squared_norms
     try:
-        yield lambda: torch.stack(squared_norms).sum(dim=0).sqrt()
+        yield lambda: torch.stack([torch.cat(n) for n in squared_norms.values()]).sum(0).sqrt()
     finally:
-        for layer in layers:
-            layer.watcher = None
+        for part in parts:
+            part.watcher = None
 
 
-def _patch_linear_layers(model: nn.Module) -> list[PatchLinear]:
-    layers = [module for module in model.modules() if isinstance(module, PatchLinear)]
-    covered = {parameter for layer in layers for parameter in layer.parameters()}
+def _watched_parts(model: nn.Module) -> list[PatchLinear | PixelMLP]:
+    parts = [module for module in model.modules() if isinstance(module, PatchLinear | PixelMLP)]
+    covered = {parameter for part in parts for parameter in part.parameters()}
     for name, parameter in model.named_parameters():
         if parameter not in covered:
             raise TypeError(
-                f"parameter '{name}' belongs to no PatchLinear layer, so its gradient per sample "
-                "is not known: build the network of such layers, or choose a target that needs no "
-                "step norm"
+                f"parameter '{name}' belongs to no PatchLinear layer and no PixelMLP, so its "
+                "gradient per sample is not known: build the network of these, or choose a target "
+                "that needs no step norm"
             )
-    return layers
+    return parts

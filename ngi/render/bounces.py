@@ -10,9 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from ngi.backend import dr, mi
+from ngi.machine.backend import dr, mi
 from ngi.render.materials import Material, children_of, colour
 
 Bounce = Callable[..., tuple[Any, Any]]
@@ -70,7 +68,7 @@ def _dielectric(bsdf: mi.BSDF) -> Bounce:
 
     def branches(hit: mi.SurfaceInteraction3f) -> tuple[mi.Float, mi.Vector3f, mi.Float]:
         cosine = mi.Frame3f.cos_theta(hit.wi)
-        reflected, refracted_cosine, _, ratio = mi.fresnel(cosine, index)
+        reflected, refracted_cosine, _, ratio = mi.fresnel(cosine, index())
         return reflected, mi.refract(hit.wi, refracted_cosine, ratio), dr.square(ratio)
 
     index = _index(bsdf)
@@ -81,7 +79,7 @@ def _thin_dielectric(bsdf: mi.BSDF) -> Bounce:
     """Reflection, with all that goes to and fro inside the sheet, or straight on."""
 
     def branches(hit: mi.SurfaceInteraction3f) -> tuple[mi.Float, mi.Vector3f, mi.Float]:
-        reflected = mi.fresnel(dr.abs(mi.Frame3f.cos_theta(hit.wi)), index)[0]
+        reflected = mi.fresnel(dr.abs(mi.Frame3f.cos_theta(hit.wi)), index())[0]
         return 2 * reflected / (1 + reflected), -hit.wi, mi.Float(1)
 
     index = _index(bsdf)
@@ -109,9 +107,10 @@ def _stronger(
     return bounce
 
 
-def _index(bsdf: mi.BSDF) -> float:
-    """Refractive index of the inside relative to the outside; no variable changes it."""
-    return float(np.ravel(mi.traverse(bsdf)["eta"])[0])
+def _index(bsdf: mi.BSDF) -> Callable[[], mi.Float]:
+    """Refractive index of the inside relative to the outside, as it is at present."""
+    parameters = mi.traverse(bsdf)
+    return lambda: mi.Float(parameters["eta"])
 
 
 _DIELECTRICS: dict[str, Callable[[mi.BSDF], Bounce]] = {

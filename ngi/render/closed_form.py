@@ -30,6 +30,7 @@ class ClosedFormRenderer(ABC):
     """
 
     description = "closed formulas, PyTorch"
+    buffer_samples = 1
     camera_part = slice(0, 0)
 
     def __init__(

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from torch.quasirandom import SobolEngine
 
-from ngi.backend import dr, mi
+from ngi.machine.backend import dr, mi
 
 _SOBOL_DIMENSIONS = (1, 2, 3, 4, 5)
 _LEAST_DENSITY = 1e-30

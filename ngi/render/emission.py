@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ngi.backend import mi
+from ngi.machine.backend import mi
 
 
 def emission(scene: mi.Scene, hit: mi.SurfaceInteraction3f) -> mi.Color3f:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ngi.backend import dr, mi
+from ngi.machine.backend import dr, mi
 from ngi.patches import BufferLayout
 from ngi.render.direct_light import direct_light
 from ngi.render.emission import emission

@@ -16,7 +16,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from ngi.backend import dr, mi
+from ngi.machine.backend import dr, mi
 from ngi.render.direct_light import light_points
 from ngi.render.first_hit import FirstHit
 from ngi.render.fitting import does_not_fit
@@ -189,7 +189,7 @@ def _block_sums(values: list[mi.Float], samples: int) -> list[mi.Float]:
 def _pending(sums: list[mi.Float], window: Window, samples: int) -> Pending:
     def read() -> Tensor:
         dr.sync_thread()
-        mean = torch.stack([torch.from_dlpack(channel) for channel in sums], dim=-1)
+        mean = torch.stack([torch.utils.dlpack.from_dlpack(channel) for channel in sums], dim=-1)
         mean /= samples
         if mean.is_cuda:
             torch.cuda.synchronize()  # before Dr.Jit uses the memory of the sums again

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ngi.backend import dr, mi
+from ngi.machine.backend import dr, mi
 
 Lookup = Callable[..., Any]
 """(hit: SurfaceInteraction3f, active: Bool) -> Color3f or Float."""
@@ -86,7 +86,7 @@ def children_of(bsdf: mi.BSDF) -> dict[str, mi.Object]:
     """The BSDFs and textures directly inside a BSDF, by parameter name."""
     children = {}
 
-    class Collect(mi.TraversalCallback):
+    class Collect(mi.TraversalCallback):  # type: ignore[misc]
         def put(self, name: str, value: object, *_: object) -> None:
             if isinstance(value, mi.Object):
                 children[name] = value

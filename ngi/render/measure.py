@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ngi.backend import activate, dr, mi
+from ngi.machine.backend import activate, dr, mi
 from ngi.render.jit_tracer import JitTracer
 from ngi.render.tracing import Pending
 from ngi.scene import SceneDescription

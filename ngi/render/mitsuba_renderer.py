@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ngi.backend import activate, describe, mi
+from ngi.machine.backend import activate, describe, mi
 from ngi.render.first_hit import first_hit_of
 from ngi.render.fitting import FittingTracer
 from ngi.render.jit_tracer import JitTracer, free_memory
@@ -35,7 +35,7 @@ class MitsubaRenderer:
     """The `ngi.render.Renderer` of a scene folder (paper, Sec. 4 and 6).
 
     scene: what `ngi.scene.read_scene` gives for a scene folder.
-    backend: 'auto', 'cuda', 'llvm' or 'scalar', see `ngi.backend.activate`.
+    backend: 'auto', 'cuda', 'llvm' or 'scalar', see `ngi.machine.backend.activate`.
     patch_size: P, pixels along a patch's side.
     samples_per_pixel: of training patches; the scene's own number where None.
     buffer_samples: rays per pixel of the buffers; `BUFFER_SAMPLES` where None.
@@ -77,7 +77,7 @@ class MitsubaRenderer:
         # Scenes of a sweep's finished jobs are left in cycles, and slow every launch down.
         gc.collect()
         self._scene = VariableScene(scene, arrange=needed_only)
-        self._require_square_film()
+        self._check_camera()
         first_hit = first_hit_of(
             self._scene,
             needed_only=needed_only,
@@ -85,7 +85,7 @@ class MitsubaRenderer:
             trace_direct=direct == "traced",
         )
         buffer_samples = buffer_samples or BUFFER_SAMPLES[self._variant]
-        self._buffer_samples = buffer_samples
+        self.buffer_samples = buffer_samples
         loaded = self._scene.scene
         self._patch_tracer: Tracer
         self._image_tracer: Tracer
@@ -244,7 +244,7 @@ class MitsubaRenderer:
 
     def _whole_buffers(self, resolution: int) -> Tensor:
         """[H, W, C] of the scene as it stands, radiance linear; no NaN or Inf."""
-        all_bands = bands(resolution, self._buffer_samples)
+        all_bands = bands(resolution, self.buffer_samples)
         return torch.cat([_masked(self._image_tracer.buffers(band)()) for band in all_bands])
 
     def _encode(self, buffers: Tensor) -> Tensor:
@@ -254,10 +254,15 @@ class MitsubaRenderer:
                 buffers[..., self.layout.slice(name)].log1p_()
         return buffers
 
-    def _require_square_film(self) -> None:
-        width, height = self._scene.scene.sensors()[0].film().size()
+    def _check_camera(self) -> None:
+        sensor, path = self._scene.scene.sensors()[0], self._scene.description.document.path
+        if sensor.class_name() != "PerspectiveCamera":
+            raise ValueError(
+                f"{path}: the camera is a {sensor.class_name()}; make it <sensor "
+                "type='perspective'>: rays all begin in one point here"
+            )
+        width, height = sensor.film().size()
         if width != height:
-            path = self._scene.description.document.path
             raise ValueError(
                 f"{path}: the film is {width} x {height}; make width and height equal, since the "
                 "virtual image is a square"

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ngi.backend import mi
+from ngi.machine.backend import mi
 from ngi.patches import BufferLayout
 from ngi.render.materials import Material
 from ngi.scene.variable_scene import VariableScene

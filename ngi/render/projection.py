@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ngi.backend import mi
+from ngi.machine.backend import mi
 from ngi.scene.variable_scene import VariableScene
 
 
@@ -26,17 +26,8 @@ class Projection:
                 f"{scene.description.name}: the camera is moved by other variables than look_at "
                 "and camera_path, and where it is cannot be told without loading the scene"
             )
-        half = np.tan(np.radians(float(np.ravel(parameters["x_fov"])[0])) / 2)
-        shift = [float(np.ravel(parameters[f"principal_point_offset_{a}"])[0]) for a in "xy"]
-        # A film coordinate is 1/2 + offset - x / (2 z tan(fov / 2)); local x is to the left, y up.
-        self._to_film = np.array(
-            [
-                [-0.5 / half, 0, 0.5 + shift[0], 0],
-                [0, -0.5 / half, 0.5 + shift[1], 0],
-                [0, 0, 1, 0],
-                [0, 0, 1, 0],
-            ]
-        )
+        self._fov = float(np.ravel(parameters["x_fov"])[0])
+        self._shift = [float(np.ravel(parameters[f"principal_point_offset_{a}"])[0]) for a in "xy"]
 
     def matrices(self, scene_vectors: NDArray[np.float32]) -> NDArray[np.float64]:
         """[n, 4, 4] for v [n, D]; see `ngi.render.Renderer.projections`."""
@@ -47,5 +38,21 @@ class Projection:
         for v in scene_vectors:
             placed = self._description.camera_to_world(v)
             camera = self._authored if placed is None else placed
-            found.append(self._to_film @ np.linalg.inv(camera) @ to_world)
+            fov = self._description.field_of_view(v) or self._fov
+            found.append(self._to_film(fov) @ np.linalg.inv(camera) @ to_world)
         return np.array(found).reshape(-1, 4, 4)
+
+    def _to_film(self, fov: float) -> NDArray[np.float64]:
+        """[4, 4]: from the camera's own coordinates.
+
+        A film coordinate is 1/2 + offset - x / (2 z tan(fov / 2)); local x is to the left, y up.
+        """
+        half = np.tan(np.radians(fov) / 2)
+        return np.array(
+            [
+                [-0.5 / half, 0, 0.5 + self._shift[0], 0],
+                [0, -0.5 / half, 0.5 + self._shift[1], 0],
+                [0, 0, 1, 0],
+                [0, 0, 1, 0],
+            ]
+        )

@@ -68,6 +68,8 @@ class Renderer(Protocol):
     """P, pixels along a patch's side."""
     samples_per_pixel: int
     """spp of training patches."""
+    buffer_samples: int
+    """Rays per pixel of the buffers."""
     camera_part: slice
     """The components of v that place the camera; empty where none does."""
     scene_hash: str

@@ -6,7 +6,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from ngi.backend import mi
+from ngi.machine.backend import mi
 from ngi.render.direct_light import light_points
 from ngi.render.first_hit import FirstHit
 from ngi.render.tracing import Pending, Window, subpixel_points

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ngi.backend import dr, mi
+from ngi.machine.backend import dr, mi
 from ngi.render.bounces import SpecularSurface, specular_surface
 from ngi.render.emission import emission
 from ngi.render.materials import Material, collect_materials, has_bsdf

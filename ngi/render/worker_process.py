@@ -19,7 +19,7 @@ from threading import Thread
 
 import torch
 
-from ngi.memory import keep_freed_memory
+from ngi.machine.memory import keep_freed_memory
 from ngi.render.worker_protocol import RenderServer, Reply, Request, WorkerDiedError
 
 NICENESS = 10

@@ -90,8 +90,8 @@ class RenderServer:
     def _start(self) -> None:
         torch.set_num_threads(1)  # of a patch's few operations
         self._renderer = pickle.loads(self._make)()
-        if "ngi.backend" in sys.modules:
-            from ngi.backend import dr
+        if "ngi.machine.backend" in sys.modules:
+            from ngi.machine.backend import dr
 
             dr.set_thread_count(self._threads)
         self._renderer.warm_up()

@@ -26,7 +26,7 @@ def mitsuba_renderer(*, workers: int, cluster: str | None, **options: Any) -> Re
     Raises ValueError for a cluster without workers, and what `MitsubaRenderer` and
     `WorkerRenderer` raise.
     """
-    from ngi.backend import VARIANTS, activate
+    from ngi.machine.backend import VARIANTS, activate
     from ngi.render.mitsuba_renderer import MitsubaRenderer
 
     if workers == 0 and cluster is not None:
@@ -70,6 +70,7 @@ class WorkerRenderer:
         self.dimensions = self._local.dimensions
         self.patch_size = self._local.patch_size
         self.samples_per_pixel = self._local.samples_per_pixel
+        self.buffer_samples = self._local.buffer_samples
         self.camera_part = self._local.camera_part
         self.scene_hash = self._local.scene_hash
         self._workers = workers

@@ -10,7 +10,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from ngi.durable import PARTIAL_SUFFIX, DamagedError, write_tensors
+from ngi.files.durable import PARTIAL_SUFFIX, DamagedError, write_tensors
 from ngi.reuse.compact import CompactPatches
 from ngi.reuse.store import PatchStore
 

@@ -39,6 +39,8 @@ class PatchStore:
         self._slots: dict[int, int] = {}  # id -> slot, oldest id first; slots 0 … len - 1 are full
         self._ids = torch.zeros(capacity, dtype=torch.int64)  # by slot
         self._losses = torch.zeros(capacity, dtype=torch.float64)  # by slot, finite and >= 0
+        self._weights = torch.ones(capacity, dtype=torch.float64)  # by slot
+        self._weighted = False
         self._pinned: frozenset[int] = frozenset()
         self._next_id = 0
         self._non_finite_losses = 0
@@ -85,8 +87,10 @@ class PatchStore:
         """How many NaN or infinite losses were recorded, as 0, so far."""
         return self._non_finite_losses
 
-    def add(self, patches: Patches) -> Tensor:
+    def add(self, patches: Patches, weights: Tensor | None = None) -> Tensor:
         """Stores n patches and returns their ids, [n] int64, consecutive.
+
+        weights: [n], factors of their losses whenever they are trained on; None for 1
 
         Until their losses are recorded they have the stored patches' mean loss, the first ones 1.
         Raises ValueError, and stores nothing, for patches of another scene or size, for numbers
@@ -105,6 +109,8 @@ class PatchStore:
         self._slots.update(zip(ids, slots, strict=True))
         self._ids[slots] = torch.tensor(ids, dtype=torch.int64)
         self._losses[slots] = initial_loss
+        self._weights[slots] = 1.0 if weights is None else weights.double()
+        self._weighted |= weights is not None
         self._next_id += len(compact)
         return torch.tensor(ids, dtype=torch.int64)
 
@@ -134,6 +140,8 @@ class PatchStore:
         """
         slots = torch.tensor(self._slots_of(ids), dtype=torch.int64)
         weights = self._rule.weights(self._losses[: len(self)], slots)
+        if self._weighted:
+            weights = self._weights[slots] * (1.0 if weights is None else weights)
         return None if weights is None else weights.float()
 
     def hardest(self, count: int) -> tuple[Tensor, Tensor]:
@@ -172,6 +180,7 @@ class PatchStore:
         return {
             "ids": self._ids[: len(self)].clone(),
             "losses": self._losses[: len(self)].clone(),
+            "weights": self._weights[: len(self)].clone() if self._weighted else None,
             "waiting": self._waiting,
             "pinned": sorted(self._pinned),
             "next_id": self._next_id,
@@ -211,6 +220,9 @@ class PatchStore:
         self._slots = dict(sorted(slots.items()))
         self._ids[: len(ids)] = state["ids"]
         self._losses[: len(ids)] = state["losses"]
+        weights = state.get("weights")  # checkpoints from before there were any have none
+        self._weighted = weights is not None
+        self._weights[: len(ids)] = 1.0 if weights is None else weights
         self._waiting = state["waiting"]
         self._pinned = frozenset(state["pinned"])
         self._next_id = state["next_id"]

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ngi.backend import dr, mi
+from ngi.machine.backend import dr, mi
 from ngi.scene.jit_variables import address, variables_of
 
 _LIBRARY = "libembree3.so"

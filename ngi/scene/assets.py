@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import copy
 from pathlib import Path
-from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
 import numpy as np
 
-from ngi.backend import mi
+from ngi.machine.backend import mi
+from ngi.scene import srgb
+from ngi.scene.complaints import without_place
+from ngi.scene.parameters import Parameters
 from ngi.scene.scene_files import SceneFile
 from ngi.scene.variable import Values
-
-if TYPE_CHECKING:
-    from ngi.scene.scene_parameters import SceneParameters
 
 _GEOMETRY = ("string", "boolean", "transform")
 
@@ -26,7 +25,7 @@ class Bitmap:
     `raw`; others, and all where the texture says so (`format`), as linear floating-point numbers.
     """
 
-    def __init__(self, parameters: SceneParameters, key: str) -> None:
+    def __init__(self, parameters: Parameters, key: str) -> None:
         texture, data = parameters.owner(key), parameters.value(key)
         self._kind = type(data)
         self._raw = "raw = 1" in str(texture)  # the texture has no attribute that says it
@@ -51,19 +50,8 @@ class Bitmap:
         if self._kind.__name__ != "TensorXu8":
             return linear
         if not self._raw:
-            curve = 1.055 * np.maximum(linear, 0.0031308) ** (1 / 2.4) - 0.055
-            linear = np.where(linear <= 0.0031308, 12.92 * linear, curve)
+            linear = srgb.encoded(linear)
         return np.round(255 * linear)
-
-    def linear(self, stored: Values) -> Values:
-        """What the texture's numbers stand for: the inverse of `stored`."""
-        if self._kind.__name__ != "TensorXu8":
-            return stored
-        numbers = stored / 255
-        if self._raw:
-            return numbers
-        curve = ((np.maximum(numbers, 0.04045) + 0.055) / 1.055) ** 2.4
-        return np.where(numbers <= 0.04045, numbers / 12.92, curve)
 
 
 def authored_to_world(document: SceneFile, object_id: str) -> Values:
@@ -89,7 +77,10 @@ def load_vertices(document: SceneFile, object_id: str, path: Path) -> tuple[Valu
     name.set("value", str(document.path.parent.resolve() / name.get("value", "")))
     present = mi.traverse(_loaded(document, authored))
     name.set("value", str(path))
-    other = mi.traverse(_loaded(document, authored))
+    try:
+        other = mi.traverse(_loaded(document, authored))
+    except RuntimeError as error:
+        raise ValueError(f"{path}: Mitsuba cannot load it: {without_place(str(error))}") from error
     if not np.array_equal(present["faces"], other["faces"]):
         raise ValueError(
             f"{path}: its triangles are not those of the mesh '{object_id}' in scene.xml; key "

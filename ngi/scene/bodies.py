@@ -1,22 +1,19 @@
-"""What variables change of a loaded scene's objects: a to_world, vertices, or an emitted colour."""
+"""What variables change of a scene's objects: a to_world, a point, vertices, an emitted colour."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from ngi.scene.assets import authored_to_world
+from ngi.scene.parameters import Parameters
 from ngi.scene.transforms import Matrix
 from ngi.scene.variable import Values
-
-if TYPE_CHECKING:
-    from ngi.scene.scene_parameters import SceneParameters
 
 
 class Transformed:
     """A body with a to_world: instance, sphere, rectangle, emitter or camera."""
 
-    def __init__(self, parameters: SceneParameters, key: str) -> None:
+    def __init__(self, parameters: Parameters, key: str) -> None:
         self._parameters, self._key = parameters, key
         # The authored matrix holds a sphere's radius and a rectangle's size too.
         self._authored = parameters.read(key)
@@ -34,10 +31,27 @@ class Transformed:
         )
 
 
+class Positioned:
+    """A body that is a point: a light without a direction."""
+
+    def __init__(self, parameters: Parameters, key: str) -> None:
+        self._parameters, self._key = parameters, key
+        self.origin = parameters.read(key)
+
+    def move(self, matrix: Matrix) -> None:
+        self._parameters.write(self._key, matrix[:3, :3] @ self.origin + matrix[:3, 3])
+
+    def place(self, to_world: Values) -> None:  # noqa: ARG002
+        raise ValueError(f"scene.yaml: {self._key}: a point cannot be placed by a matrix")
+
+    def reshape(self, positions: Values, normals: Values | None) -> None:  # noqa: ARG002
+        raise ValueError(f"scene.yaml: {self._key}: a point has no key frames")
+
+
 class Vertices:
     """A body of vertices, already in world space: a mesh that is no instance, such as a lamp."""
 
-    def __init__(self, parameters: SceneParameters, object_id: str) -> None:
+    def __init__(self, parameters: Parameters, object_id: str) -> None:
         hint = "it has no vertices"
         self._parameters, self._id = parameters, object_id
         self._keys = [
@@ -49,7 +63,7 @@ class Vertices:
 
     @property
     def origin(self) -> Values:
-        return self._parameters.authored_to_world(self._id)[:3, 3]
+        return authored_to_world(self._parameters.document, self._id)[:3, 3]
 
     def move(self, matrix: Matrix) -> None:
         moved = self._positions @ matrix[:3, :3].T + matrix[:3, 3]
@@ -69,7 +83,7 @@ class Vertices:
 class Emission:
     """Colour times factor of an emitter; either may vary."""
 
-    def __init__(self, parameters: SceneParameters, key: str) -> None:
+    def __init__(self, parameters: Parameters, key: str) -> None:
         self._parameters, self._key = parameters, key
         self.colour, self._factor = parameters.read(key), 1.0
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ngi.backend import dr, mi
+from ngi.machine.backend import dr, mi
 from ngi.scene.acceleration import EmbreeScene
 from ngi.scene.jit_variables import evaluate
 

@@ -8,7 +8,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ngi.backend import dr, mi
+from ngi.machine.backend import dr, mi
+from ngi.scene.jit_variables import aligned
 from ngi.scene.kinds import CameraPath, LookAt, Material
 from ngi.scene.variable_scene import VariableScene
 
@@ -96,13 +97,14 @@ def _intersections(scene: mi.Scene) -> Intersect:
     if mi.variant().startswith("scalar"):
         return partial(_intersect_one_by_one, scene)
 
-    @dr.freeze
+    @dr.freeze  # type: ignore[untyped-decorator]
     def trace(scene: mi.Scene, rays: mi.Ray3f) -> tuple[mi.Bool, mi.Float, mi.Float]:
         hit = scene.ray_intersect(rays)
         return hit.is_valid(), dr.dot(hit.n, rays.d), hit.t
 
     def intersect(origins: Points, directions: Points) -> Hits:
-        rays = mi.Ray3f(mi.Point3f(*origins.T), mi.Vector3f(*directions.T))
+        ends = [[aligned(axis, np.float32) for axis in side.T] for side in (origins, directions)]
+        rays = mi.Ray3f(mi.Point3f(*ends[0]), mi.Vector3f(*ends[1]))
         dr.make_opaque(rays)
         valid, cosine, distance = trace(scene, rays)
         return np.array(valid), np.array(cosine) > 0, np.array(distance, dtype=np.float64)

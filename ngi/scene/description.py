@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ngi.scene.kinds import CameraPath, FieldOfView, LookAt
 from ngi.scene.scene_files import SceneFile
 from ngi.scene.transforms import Matrix, look_at
 from ngi.scene.variable import Variable
@@ -91,12 +92,22 @@ class SceneDescription:
             return None
         variable, part = self._view
         view = variable.value(np.asarray(scene_vector, dtype=np.float64)[part])
-        return look_at(view[:3], view[3:], np.array(variable.up))  # type: ignore[attr-defined]
+        return look_at(view[:3], view[3:], np.array(variable.up))
+
+    def field_of_view(self, scene_vector: ArrayLike) -> float | None:
+        """Degrees that the camera sees across at v [D]; None where no variable says it."""
+        for variable, part in self.parts():
+            if isinstance(variable, FieldOfView):
+                return float(variable.value(np.asarray(scene_vector, dtype=np.float64)[part])[0])
+        return None
 
     @cached_property
-    def _view(self) -> tuple[Variable, slice] | None:
+    def _view(self) -> tuple[LookAt | CameraPath, slice] | None:
         """The variable whose value is the camera's origin and target, and its components of v."""
-        return next((found for found in self.parts() if "camera" in found[0].affects), None)
+        for variable, part in self.parts():
+            if isinstance(variable, LookAt | CameraPath):
+                return variable, part
+        return None
 
     def _checked(self, scene_vector: ArrayLike) -> NDArray[np.float64]:
         v = np.asarray(scene_vector, dtype=np.float64)

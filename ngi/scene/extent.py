@@ -17,6 +17,9 @@ CONFIGURATIONS = 8
 TOLERANCE = 0.001
 """How far a shape may reach out, as a share of the diagonal of the box."""
 
+NEARLY = 1e-9
+"""How near two points may come to have no direction between them, see `transforms.look_at`."""
+
 
 def out_of_bounds(scene: VariableScene) -> list[str]:
     """A line for every shape that somewhere reaches out of the box `bounds`.
@@ -43,14 +46,24 @@ def meeting_views(description: SceneDescription) -> list[str]:
     """A line for every look_at whose origin and target can be the same point."""
     return [
         f"{'+'.join(variable.objects)}.look_at: origin and target can meet, for example at "
-        f"{low.round(3).tolist()}, where the camera looks nowhere; keep their ranges apart along "
+        f"{place.round(3).tolist()}, where the camera looks nowhere; keep their ranges apart along "
         "one axis"
         for variable in description.variables
-        if isinstance(variable, LookAt)
-        for ranges in [np.array([variable.minimum, variable.maximum]).reshape(2, 2, 3)]
-        for low, high in [(ranges.min(axis=0).max(axis=0), ranges.max(axis=0).min(axis=0))]
-        if (low <= high).all()
+        if isinstance(variable, LookAt) and (place := _meeting(variable)) is not None
     ]
+
+
+def _meeting(variable: LookAt) -> np.ndarray | None:
+    """[3]: a point that can be origin and target at once, if there is one."""
+    low, high = np.array([variable.minimum, variable.maximum]).reshape(2, 2, 3)
+    if variable.linked:  # where along the way of both the two are nearest
+        start, change = low[1] - low[0], (high - low)[1] - (high - low)[0]
+        u = np.clip(-start @ change / max(change @ change, 1e-300), 0, 1)
+        origin, target = low + u * (high - low)
+        return origin if np.linalg.norm(target - origin) < NEARLY else None
+    ranges = np.stack([np.minimum(low, high), np.maximum(low, high)])
+    inner, outer = ranges[0].max(axis=0), ranges[1].min(axis=0)
+    return inner if (inner <= outer).all() else None
 
 
 def _configurations(description: SceneDescription) -> Iterator[np.ndarray]:

@@ -10,10 +10,11 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from ngi.resources import scene_folders
+from ngi.files.resources import scene_folders
 from ngi.scene.description import SceneDescription, component_names
 from ngi.scene.frames import HARD_FRAMES, PATH_FRAMES, spread_frames
 from ngi.scene.kinds import KINDS
+from ngi.scene.offered import advice
 from ngi.scene.permission import allowed_file
 from ngi.scene.scene_files import (
     content_hash,
@@ -159,7 +160,8 @@ def _variable(path: Path, index: int, entry: Any) -> Variable:
     if kind not in KINDS:
         near = get_close_matches(kind, KINDS, n=1)
         meant = f" (did you mean '{near[0]}'?)" if near else ""
-        raise keys.error("property", kind, f"choose one of {list(KINDS)}{meant}")
+        known = f"choose one of {list(KINDS)}{meant}"
+        raise keys.error("property", kind, advice(kind) or known)
     variable = KINDS[kind].read(keys.names("object", at_least=1), keys)
     if not variable.components:
         raise keys.error("maximum", entry["maximum"], "it equals minimum, so that nothing varies")

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+import numpy as np
 import torch
+from numpy.typing import DTypeLike, NDArray
 
-from ngi.backend import dr, mi
+from ngi.machine.backend import dr, mi
 
 
 def variables_of(node: mi.Object) -> list[mi.UInt64]:
@@ -32,4 +34,22 @@ def evaluate(nodes: Iterable[mi.Object]) -> None:
 
 def address(variable: dr.ArrayBase) -> int:
     """Where an evaluated variable lies in memory."""
-    return int(torch.from_dlpack(variable).data_ptr())
+    return int(torch.utils.dlpack.from_dlpack(variable).data_ptr())
+
+
+_ALIGNMENT = 64
+"""Bytes, of Dr.Jit's own memory."""
+
+
+def aligned(numbers: NDArray[np.float64], kind: DTypeLike) -> NDArray[np.generic]:
+    """A copy of another type, in memory that begins where Dr.Jit's own would.
+
+    Dr.Jit takes NumPy's memory as it is. Its kernels are others for memory that begins elsewhere: a
+    frozen function would be recorded again by chance, once for every combination of its inputs.
+    """
+    dtype = np.dtype(kind)
+    memory = np.empty(numbers.size * dtype.itemsize + _ALIGNMENT, np.uint8)
+    start = -memory.ctypes.data % _ALIGNMENT
+    array = memory[start : start + numbers.size * dtype.itemsize].view(dtype)
+    array[:] = numbers.ravel()
+    return array.reshape(numbers.shape)

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import re
-from bisect import bisect_right
 from xml.etree import ElementTree
 
-from ngi.backend import mi
+from ngi.machine.backend import mi
+from ngi.scene.complaints import in_words
 from ngi.scene.scene_files import SceneFile, file_references
-from ngi.scene.xml_file import shown
+from ngi.scene.xml_file import named, parents_in
 
 FROM_FILES = ("bitmap", "envmap", "gridvolume", "obj", "ply", "serialized")
 """Plugins that are nothing without a file; Mitsuba 3.9 crashes on a bitmap without."""
-
-_PLACE = re.compile(r"^.*?\(line (?P<line>\d+), col \d+\): ", re.DOTALL)
-"""Of Mitsuba's messages about XML."""
 
 
 def load(document: SceneFile) -> mi.Scene:
@@ -30,29 +26,12 @@ def load(document: SceneFile) -> mi.Scene:
     # Optimising would merge meshes that share a BSDF, and their ids would be lost.
     for element in absolute.iter():
         if element.get("type") in FROM_FILES and element.find("string[@name='filename']") is None:
-            place = f"<{element.tag} type='{element.get('type')}'>"
-            raise ValueError(
-                f"{document.path}: {place} names no file; give it <string name='filename' …/>"
-            )
+            place = copied.places.get(element, document.path)
+            name = named(element, parents_in(absolute))
+            raise ValueError(f"{place}: {name} names no file; give it <string name='filename' …/>")
     ElementTree.indent(absolute, space="")  # a tag per line, by which Mitsuba's place is known
     text = ElementTree.tostring(absolute, encoding="unicode")
     try:
         return mi.load_string(text, optimize=False)
     except RuntimeError as error:
-        raise ValueError(_in_words(str(error), text, copied)) from error
-
-
-def _in_words(message: str, text: str, document: SceneFile) -> str:
-    """Mitsuba's message about `text`, with the place in the file that the user wrote."""
-    match = _PLACE.search(message)
-    if match is None:
-        return f"{document.path}: Mitsuba cannot load it: {message}"
-    starts = [n for n, line in enumerate(text.splitlines(), 1) if not line.startswith("</")]
-    elements = list(document.root.iter())
-    element = elements[bisect_right(starts, int(match["line"])) - 1]
-    around = {child: parent for parent in elements for child in parent}
-    written = element
-    while written not in document.places and written in around:
-        written = around[written]  # what this program has added stands in what the user wrote
-    place = document.places.get(written, str(document.path))
-    return f"{place}: {shown(element)}: {message[match.end() :]}"
+        raise ValueError(in_words(str(error), text, copied)) from error

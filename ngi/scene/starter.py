@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ngi.backend import mi
+from ngi.machine.backend import mi
 from ngi.scene.scene_files import SceneFile, integrator_max_depth
 
 FACTOR = ", minimum: 0.5, maximum: 2"
@@ -78,29 +78,64 @@ def starter_yaml(document: SceneFile, scene: mi.Scene, found: list[Candidate]) -
 def _entries(node: mi.Object, scene: mi.Scene) -> dict[str, str]:
     """Property -> the rest of its entry, with a range to start from."""
     if isinstance(node, mi.Sensor):
-        return {"look_at": _views(node, scene)}
+        return {"look_at": _views(node, scene), **_field_of_view(node)}
     if isinstance(node, mi.Emitter):
-        return _light(node)
+        return _light(node, _step(scene))
     if isinstance(node, mi.BSDF):
         return _surface(node)
     if not isinstance(node, mi.Shape) or node.class_name().startswith("ShapeGroup"):
         return {}
-    step = round(float(np.linalg.norm(np.subtract(*_bounds(scene)))) / 10, 3)
     entries = {
-        "translation": f", minimum: [{-step}, 0, {-step}], maximum: [{step}, 0, {step}]",
+        "translation": _offsets(_step(scene)),
         "rotation": ", axis: [0, 1, 0], minimum: -30, maximum: 30",
         "scale": ", minimum: 0.8, maximum: 1.2",
     }
     return entries | ({"intensity": FACTOR} if node.is_emitter() else {"visibility": ""})
 
 
-def _light(emitter: mi.Emitter) -> dict[str, str]:
+def _light(emitter: mi.Emitter, step: float) -> dict[str, str]:
     kind = emitter.class_name()
     if kind == "DirectionalEmitter":
         return {"direction": ", minimum: [0, 20], maximum: [90, 60]", "intensity": FACTOR}
     if kind == "EnvironmentMapEmitter":
         return {"rotation": ", axis: [0, 1, 0], minimum: 0, maximum: 360", "intensity": FACTOR}
-    return {"intensity": FACTOR}
+    entries = {"intensity": FACTOR}
+    if kind in ("PointLight", "SpotLight", "Projector"):
+        entries["translation"] = _offsets(step)
+    if kind in ("SpotLight", "Projector"):
+        entries["direction"] = _aims(emitter)
+    if kind == "SpotLight":
+        cutoff, beam = (_number(emitter, name) for name in ("cutoff_angle", "beam_width"))
+        wider = min(1.5 * cutoff, 180)
+        entries["cone"] = f", minimum: {_list([cutoff, beam])}, maximum: {_list([wider, beam])}"
+    return entries
+
+
+def _aims(emitter: mi.Emitter) -> str:
+    """15 degrees about the authored direction; see `ngi.scene.kinds.view.Direction`."""
+    x, y, z = -np.array(mi.traverse(emitter)["to_world"].matrix, float).reshape(4, 4)[:3, 2]
+    angles = np.degrees([np.arctan2(x, z), np.arctan2(y, np.hypot(x, z))])
+    return f", minimum: {_list(angles - 15)}, maximum: {_list(angles + 15)}"
+
+
+def _field_of_view(sensor: mi.Sensor) -> dict[str, str]:
+    if sensor.class_name() != "PerspectiveCamera":
+        return {}
+    fov = _number(sensor, "x_fov")
+    return {"fov": f", minimum: {0.75 * fov:.4g}, maximum: {min(1.25 * fov, 179):.4g}"}
+
+
+def _number(node: mi.Object, name: str) -> float:
+    return float(np.ravel(mi.traverse(node)[name])[0])
+
+
+def _step(scene: mi.Scene) -> float:
+    """A tenth of the scene's size."""
+    return round(float(np.linalg.norm(np.subtract(*_bounds(scene)))) / 10, 3)
+
+
+def _offsets(step: float) -> str:
+    return f", minimum: [{-step}, 0, {-step}], maximum: [{step}, 0, {step}]"
 
 
 def _surface(bsdf: mi.BSDF) -> dict[str, str]:

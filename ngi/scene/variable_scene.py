@@ -7,13 +7,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ngi.backend import mi
+from ngi.machine.backend import mi
 from ngi.scene.arrangement import arranged, moving
 from ngi.scene.description import SceneDescription
 from ngi.scene.kinds import Material
 from ngi.scene.loading import load
 from ngi.scene.scene_parameters import SceneParameters, has_surface
-from ngi.scene.variable import Variable, Write
+from ngi.scene.variable import DiscreteVariable, Variable, Write
 
 
 class VariableScene:
@@ -59,10 +59,22 @@ class VariableScene:
     @cached_property
     def affected(self) -> frozenset[str]:
         """What of the buffers differs with v: camera, position, albedo, roughness, emission."""
-        affected = {name for v in self.description.variables for name in v.affects}
+        affected = {name for v in self.description.variables for name in self._affects(v)}
         if self.scene.sensors()[0].id() in self.moving:
             affected.add("camera")
         return frozenset(affected)
+
+    def _affects(self, variable: Variable) -> frozenset[str]:
+        """What a variable changes of the buffers, of all that its kind can change."""
+        if isinstance(variable, DiscreteVariable):
+            return variable.affects
+        owners = [self._parameters.object(name) for name in variable.objects]
+        if not all(isinstance(owner, mi.Emitter) for owner in owners):
+            return variable.affects
+        never_seen = mi.EmitterFlags.Delta
+        if all(mi.has_flag(owner.flags(), never_seen) for owner in owners):
+            return frozenset()
+        return variable.affects - {"position"}
 
     def bsdfs(self) -> list[mi.BSDF]:
         """Every BSDF that a ray can hit at some v."""

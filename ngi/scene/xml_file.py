@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
@@ -66,6 +67,25 @@ def shown(element: Element) -> str:
     names = ("type", "id", "name", "value")
     given = [f" {name}='{element.get(name)}'" for name in names if name in element.attrib]
     return f"<{element.tag}{''.join(given)}>"
+
+
+def outwards(element: Element, parents: Mapping[Element, Element]) -> list[Element]:
+    """The element, what it stands in, what that stands in, and so on."""
+    found = [element]
+    while found[-1] in parents:
+        found.append(parents[found[-1]])
+    return found
+
+
+def named(element: Element, parents: Mapping[Element, Element]) -> str:
+    """As `shown`, with what has an id around an element that has none."""
+    holder = next((e for e in outwards(element, parents) if "id" in e.attrib), element)
+    return shown(element) if holder is element else f"{shown(element)} in {shown(holder)}"
+
+
+def parents_in(root: Element) -> dict[Element, Element]:
+    """What each element stands in."""
+    return {child: parent for parent in root.iter() for child in parent}
 
 
 def _replace_names(path: Path, root: Element, lines: Lines, defaults: dict[str, str]) -> None:

@@ -8,7 +8,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-from ngi.options import option, run_tool
+from ngi.config.options import option, run_tool
 
 POLL = 0.5
 """Seconds to wait for something to do, after which Ctrl-C is looked at."""

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from ngi.scene import SceneDescription, Variable
 from ngi.scene.variable import DiscreteVariable, RangedVariable
 
+COLOUR = ("r", "g", "b")
+"""The components of a variable that is a colour."""
+
 
 @dataclass(frozen=True)
 class Control:
@@ -17,6 +20,7 @@ class Control:
     component: its index in v
     low, high: what 0 and 1 stand for, in the scene's units
     choices: of a discrete variable, each an equally long part of [0, 1]; else empty
+    of_colour: whether it is one of three in a row that are red, green and blue, linear
     """
 
     group: str
@@ -25,6 +29,7 @@ class Control:
     low: float = 0.0
     high: float = 1.0
     choices: tuple[str, ...] = ()
+    of_colour: bool = False
 
     def value(self, component: float) -> float:
         """In the scene's units; component in [0, 1]."""
@@ -59,14 +64,15 @@ def unnamed_controls(dimensions: int) -> tuple[Control, ...]:
 
 def _controls(variable: Variable, start: int) -> list[Control]:
     group = ", ".join(variable.objects)
-    names = [f"{variable.kind} {name}".strip() for name in variable.components]
+    names = [f"{variable.kind} {name}".replace("_", " ").strip() for name in variable.components]
     if isinstance(variable, DiscreteVariable):
         return [Control(group, names[0], start, choices=variable.choices)]
     if isinstance(variable, RangedVariable) and not variable.linked:
         ranges = zip(variable.minimum, variable.maximum, strict=True)
         limits = [limit for limit in ranges if limit[0] != limit[1]]
+        of_colour = variable.components == COLOUR
         return [
-            Control(group, name, start + i, low, high)
+            Control(group, name, start + i, low, high, of_colour=of_colour)
             for i, (name, (low, high)) in enumerate(zip(names, limits, strict=True))
         ]
     return [Control(group, name, start + i) for i, name in enumerate(names)]

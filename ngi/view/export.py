@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ngi.options import option, run_tool
+from ngi.config.options import option, run_tool
 
 if TYPE_CHECKING:
     from torch import Tensor
 
-    from ngi.models import PixelGenerator
+    from ngi.view.network_file import ImageNetwork
     from ngi.view.trained_run import TrainedRun
 
 SUFFIX = ".onnx"
@@ -51,9 +51,8 @@ def export(options: ExportOptions) -> None:
         raise ValueError(f"out: there is no folder {out.parent}")
     if missing := [name for name in PACKAGES if find_spec(name) is None]:
         raise ValueError(f"{', '.join(missing)} missing: pip install -e .[export]")
-    from ngi.durable import write_atomically
-    from ngi.models import PixelGenerator
-    from ngi.view.network_file import network_file
+    from ngi.files.durable import write_atomically
+    from ngi.view.network_file import ImageNetwork, network_file
     from ngi.view.network_metadata import network_metadata
     from ngi.view.trained_run import TrainedRun
 
@@ -61,24 +60,29 @@ def export(options: ExportOptions) -> None:
         Path(options.run), scene_path=None if options.scene is None else Path(options.scene)
     )
     with closing(run.renderer):
-        if not isinstance(run.network, PixelGenerator):
+        if not isinstance(run.network, ImageNetwork):
             raise ValueError(
                 f"run: its network is a {type(run.network).__name__}, which needs more of a frame "
-                "than buffers and v; a PixelGenerator can be exported"
+                "than buffers and v; a PixelGenerator or an EncodedGenerator can be exported"
             )
-        content = network_file(run.network, network_metadata(run))
-        differences = _checked(content, run.network, run)
+        hard = run.renderer.hard_frames()[0]
+        frame = run.renderer.image_buffers(hard, resolution=run.protocol.resolution).cpu()
+        shown = _shown_difference(run, frame, hard)
+        content = network_file(run.network, network_metadata(run, shown))
+        differences = _checked(content, run.network, _inputs(run, frame, hard))
     write_atomically(out, content)
     print(f"step {run.step}, {len(content) / 2**20:.1f} MiB; {out}")
     print(f"largest difference from the network, relative to 1 + radiance: {differences}")
 
 
-def _checked(content: bytes, network: PixelGenerator, run: TrainedRun) -> str:
+def _checked(
+    content: bytes, network: ImageNetwork, inputs: dict[str, tuple[Tensor, Tensor]]
+) -> str:
     """The largest differences between file and network; ValueError where one is too large."""
     from ngi.view.network_file import largest_difference
 
     shown = []
-    for name, (buffers, v) in _inputs(run).items():
+    for name, (buffers, v) in inputs.items():
         difference = largest_difference(content, network, buffers, v)
         if not difference <= TOLERANCE:  # NaN is too large
             raise ValueError(
@@ -89,20 +93,33 @@ def _checked(content: bytes, network: PixelGenerator, run: TrainedRun) -> str:
     return ", ".join(shown)
 
 
-def _inputs(run: TrainedRun) -> dict[str, tuple[Tensor, Tensor]]:
-    """Buffers [N, C] and v [D] to compare on, by name."""
+def _inputs(run: TrainedRun, frame: Tensor, v: Tensor) -> dict[str, tuple[Tensor, Tensor]]:
+    """Buffers [N, C] and what the network is given of v to compare on, by name.
+
+    frame: [H, W, C] at v [D]
+    """
     import torch
 
     generator = torch.Generator().manual_seed(0)
-    pixels = torch.rand(RANDOM_PIXELS, run.renderer.layout.channels, generator=generator)
-    v = torch.rand(run.renderer.dimensions, generator=generator)
-    hard = run.renderer.hard_frames()[0]
-    frame = run.renderer.image_buffers(hard, resolution=run.protocol.resolution).cpu()
-    size = f"{run.protocol.resolution} × {run.protocol.resolution}"
+    pixels = torch.rand(RANDOM_PIXELS, frame.shape[-1], generator=generator)
+    (seen,) = run.samples.test_inputs(v, resolution=len(frame))
+    size = f"{len(frame)} × {len(frame)}"
     return {
-        f"{RANDOM_PIXELS} random pixels": (pixels, v),
-        f"hard frame 0 at {size}": (frame.flatten(0, 1), hard),
+        f"{RANDOM_PIXELS} random pixels": (pixels, torch.rand(len(seen), generator=generator)),
+        f"hard frame 0 at {size}": (frame.flatten(0, 1), seen),
     }
+
+
+def _shown_difference(run: TrainedRun, frame: Tensor, v: Tensor) -> float:
+    """How far `ngi render` and the viewer, in the precision of training, are from float32."""
+    from ngi.view.network_file import relative_difference
+    from ngi.view.network_metadata import FLOAT32
+
+    shown, exact = (
+        replace(run, precision=precision).predict(frame, v).expm1()
+        for precision in (run.precision, FLOAT32)
+    )
+    return relative_difference(shown, exact)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

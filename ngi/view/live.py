@@ -16,9 +16,8 @@ import viser
 from torch import Tensor
 
 from ngi.evaluate import EvaluationProtocol
-from ngi.learn import IlluminationModule, PhaseClock, RunFolder, Samples, TrainingStream
+from ngi.learn import Run
 from ngi.learn.lightning_api import Callback
-from ngi.render import Renderer
 from ngi.scene import SceneDescription
 from ngi.view.page import Page
 from ngi.view.studio import Studio
@@ -47,23 +46,10 @@ class LiveView(Callback):
     variables: names of the components of v
     """
 
-    def __init__(
-        self,
-        *,
-        page: Page,
-        studio: Studio,
-        samples: Samples,
-        stream: TrainingStream,
-        folder: RunFolder,
-        clock: PhaseClock,
-        variables: Sequence[str],
-    ) -> None:
+    def __init__(self, run: Run, *, page: Page, studio: Studio, variables: Sequence[str]) -> None:
+        self._run = run
         self._page = page
         self._studio = studio
-        self._samples = samples
-        self._stream = stream
-        self._folder = folder
-        self._clock = clock
         self._panel = TrainingPanel(page.gui, [*variables, "patch x", "patch y"])
         self._visited: deque[tuple[Tensor, Tensor]] = deque(maxlen=KEPT_BATCHES)
         self._free_from = self._refresh_from = 0.0
@@ -77,8 +63,8 @@ class LiveView(Callback):
         due = begin >= self._refresh_from
         if not (due or self._studio.waiting):
             return
-        self._stream.finish_rendering()
-        with self._clock.phase("evaluate"):
+        self._run.stream.finish_rendering()
+        with self._run.clock.phase("evaluate"):
             if due:
                 self._studio.network_changed()
                 self._refresh()
@@ -97,36 +83,31 @@ class LiveView(Callback):
             self._page.close()
 
     def _remember(self) -> None:
-        record = self._stream.chain_record
+        record = self._run.stream.chain_record
         if record is not None and "position" in record:
             states = torch.from_numpy(np.asarray(record["position"]))
             self._visited.append((states, torch.from_numpy(record["target_proposed"])))
 
     def _refresh(self) -> None:
-        store, current = self._stream.store, self._stream.chains.position
+        store, current = self._run.stream.store, self._run.stream.chains.position
         ids, losses = store.hardest(HARDEST)
-        self._folder.steps.flush()
+        self._run.folder.steps.flush()
         states, densities = zip(*self._visited, strict=True) if self._visited else ((), ())
         empty = torch.empty(0, current.shape[1])
         self._panel.show(
-            evaluations=_rows(self._folder.metrics.path),
-            steps=_rows(self._folder.steps.path),
+            evaluations=_rows(self._run.folder.metrics.path),
+            steps=_rows(self._run.folder.steps.path),
             visited=Visited(
                 torch.cat([empty, *states]), torch.cat([torch.empty(0), *densities]), current
             ),
-            patches=self._samples.example(store.get(ids))[1],
+            patches=self._run.samples.example(store.get(ids))[1],
             losses=losses.tolist(),
         )
 
 
 def live_view(
+    run: Run,
     *,
-    renderer: Renderer,
-    samples: Samples,
-    module: IlluminationModule,
-    stream: TrainingStream,
-    folder: RunFolder,
-    clock: PhaseClock,
     scene_name: str,
     description: SceneDescription | None,
     protocol: EvaluationProtocol,
@@ -138,27 +119,21 @@ def live_view(
     """
     about = subject(
         name=f"{scene_name}, training",
-        folder=folder.path,
+        folder=run.folder.path,
         description=description,
-        renderer=renderer,
+        renderer=run.renderer,
         protocol=protocol,
     )
 
     def predict(buffers: Tensor, v: Tensor) -> Tensor:
-        return module.predict(buffers, *samples.test_inputs(v, resolution=len(buffers)))
+        inputs = run.samples.test_inputs(v, resolution=len(buffers))
+        return run.module.predict(buffers, *inputs)
 
-    studio = Studio(renderer=renderer, predict=predict)
+    studio = Studio(renderer=run.renderer, predict=predict)
     page = Page(studio, about, resolution=protocol.resolution, host="127.0.0.1", port=port)
     log.info("%s shows the training", page.address)
-    return LiveView(
-        page=page,
-        studio=studio,
-        samples=samples,
-        stream=stream,
-        folder=folder,
-        clock=clock,
-        variables=[f"{control.group} {control.name}" for control in about.controls],
-    )
+    variables = [f"{control.group} {control.name}" for control in about.controls]
+    return LiveView(run, page=page, studio=studio, variables=variables)
 
 
 class TrainingPanel:

@@ -11,7 +11,7 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import NDArray
 
-from ngi.durable import PARTIAL_SUFFIX
+from ngi.files.durable import PARTIAL_SUFFIX
 
 QUALITY = "16"
 """x264's constant rate factor: no difference to the pictures can be seen."""

@@ -12,8 +12,10 @@ import onnxruntime
 import torch
 from torch import Tensor, nn
 
-from ngi.models import PixelGenerator
+from ngi.models import EncodedGenerator, PixelGenerator
 
+ImageNetwork = PixelGenerator | EncodedGenerator
+"""A network that tells radiance from the buffers of a pixel and from v."""
 TRACED_PIXELS = 16
 """In the example that the network is traced with; the file takes any number."""
 
@@ -21,10 +23,10 @@ TRACED_PIXELS = 16
 class PixelRadiance(nn.Module):
     """A network for pixels in any order, all at one v, in linear radiance.
 
-    v, [1, D], makes one bias per layer, however many pixels there are (see `PatchLinear`).
+    v, [1, D], makes one bias per layer that sees it, however many pixels there are.
     """
 
-    def __init__(self, network: PixelGenerator) -> None:
+    def __init__(self, network: ImageNetwork) -> None:
         super().__init__()
         self.network = network
 
@@ -34,7 +36,7 @@ class PixelRadiance(nn.Module):
         return torch.expm1(log_radiance[0, :, 0])
 
 
-def network_file(network: PixelGenerator, metadata: Mapping[str, str]) -> bytes:
+def network_file(network: ImageNetwork, metadata: Mapping[str, str]) -> bytes:
     """Of an ONNX file with inputs 'buffers' [pixels, C] and 'v' [D], output 'radiance' [pixels, 3].
 
     metadata: of the file as a whole, which every runtime hands out
@@ -44,7 +46,7 @@ def network_file(network: PixelGenerator, metadata: Mapping[str, str]) -> bytes:
         torch.zeros(TRACED_PIXELS, network.layout.channels),
         torch.zeros(network.scene_dimensions),
     )
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), torch.no_grad():
         warnings.simplefilter("ignore")  # of what PyTorch's exporter itself calls
         program = torch.onnx.export(
             _in_linear_radiance(network),
@@ -63,19 +65,21 @@ def network_file(network: PixelGenerator, metadata: Mapping[str, str]) -> bytes:
     return content
 
 
-def largest_difference(
-    content: bytes, network: PixelGenerator, buffers: Tensor, v: Tensor
-) -> float:
+def largest_difference(content: bytes, network: ImageNetwork, buffers: Tensor, v: Tensor) -> float:
     """Between what ONNX Runtime and PyTorch make of [N, C] and [D], relative to 1 + |radiance|."""
     session = onnxruntime.InferenceSession(content, providers=["CPUExecutionProvider"])
     [radiance] = session.run(None, {"buffers": buffers.numpy(), "v": v.numpy()})
     with torch.no_grad():
         expected = _in_linear_radiance(network)(buffers, v)
-    difference = (torch.from_numpy(radiance) - expected).abs() / (1 + expected.abs())
-    return float(difference.max())
+    return relative_difference(torch.from_numpy(radiance), expected)
 
 
-def _in_linear_radiance(network: PixelGenerator) -> PixelRadiance:
+def relative_difference(radiance: Tensor, expected: Tensor) -> float:
+    """The largest, in units of 1 + |radiance|, of linear radiance of one shape."""
+    return float(((radiance - expected).abs() / (1 + expected.abs())).max())
+
+
+def _in_linear_radiance(network: ImageNetwork) -> PixelRadiance:
     return PixelRadiance(copy.deepcopy(network).cpu()).eval()
 
 

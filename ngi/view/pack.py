@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ngi.options import option, run_tool
+from ngi.config.options import option, run_tool
 
 KEPT_OF_RESULT = (
     *("scene_hash", "commit", "dirty", "versions", "machine", "seed", "label"),
@@ -34,7 +34,7 @@ class PackOptions:
 
 def pack(options: PackOptions) -> None:
     """Writes the folder; ValueError or OSError for what is wrong."""
-    from ngi.durable import write_atomically
+    from ngi.files.durable import write_atomically
     from ngi.learn import checkpoint_bytes
     from ngi.view.run_settings import read_settings
     from ngi.view.trained_run import NETWORK, newest_checkpoint, trained_weights

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import random
 from collections.abc import Callable, Sequence
 from itertools import groupby
@@ -12,14 +11,12 @@ from typing import Any
 import viser
 
 from ngi.evaluate.pictures import ERROR_RANGE, error_colours
-from ngi.scene.kinds import Visibility
 from ngi.view.controls import Control
+from ngi.view.inputs import Input, inputs
 from ngi.view.screen import PARTS, Screen
 from ngi.view.tone import CURVES
 
 RESOLUTIONS = ("64", "128", "256", "384", "512", "768", "900")
-STEPS = 500
-"""Of a slider from one end to the other, at least."""
 CHOOSE = "choose …"
 MOST_SLIDERS = 200
 """More variables than that are set by presets alone: a browser draws every slider."""
@@ -48,12 +45,12 @@ class Panel:
         on_change: Callable[[], None],
     ) -> None:
         self._gui = gui
-        self._controls = controls
         self._v = [float(number) for number in v]
+        self._start = tuple(self._v)
         self._presets = presets
         self._epsilon = epsilon
         self._on_change = on_change
-        self._inputs: dict[int, Any] = {}
+        self._inputs: list[tuple[Input, Any]] = []
         self.status = gui.add_markdown("…")
         self._error_scale = gui.add_image(
             error_colours(256, 12),
@@ -62,7 +59,7 @@ class Panel:
         )
         self._add_presets()
         self._add_screen(buffers, resolution)
-        self._add_controls()
+        self._add_inputs(controls)
 
     @property
     def v(self) -> tuple[float, ...]:
@@ -84,9 +81,15 @@ class Panel:
     def set_v(self, v: Sequence[float]) -> None:
         """Moves every control there."""
         self._v = [float(number) for number in v]
-        for control in self._controls:
-            self._move(control)
+        for each, made in self._inputs:
+            made.value = each.shown(self._v)
         self._on_change()
+
+    def reset(self) -> None:
+        """Everything as it was at first."""
+        for each, value in self._at_first:
+            each.value = value
+        self.set_v(self._start)
 
     def load(self, content: bytes) -> None:
         """A configuration that `saved` gave; ValueError for anything else."""
@@ -105,8 +108,9 @@ class Panel:
     def _add_presets(self) -> None:
         menu: Any = self._gui.add_dropdown("configuration", (CHOOSE, *self._presets))
         anywhere = self._gui.add_button("random configuration")
+        reset = self._gui.add_button("reset", hint="everything as it was at first")
 
-        @menu.on_update
+        @menu.on_update  # type: ignore[untyped-decorator]
         def _(_: object) -> None:
             if menu.value != CHOOSE:
                 self.set_v(self._presets[menu.value])
@@ -116,6 +120,8 @@ class Panel:
         def _(_: object) -> None:
             self.set_v([random.random() for _ in self._v])
 
+        reset.on_click(lambda _: self.reset())
+
     def _add_screen(self, buffers: Sequence[str], resolution: int) -> None:
         sizes = sorted({*RESOLUTIONS, str(resolution)}, key=int)
         with self._gui.add_folder("Picture"):
@@ -124,72 +130,34 @@ class Panel:
                 "pixels a side", sizes, initial_value=str(resolution)
             )
             self._curve = self._gui.add_dropdown("tone mapping", CURVES)
-            self._exposure = self._gui.add_slider("exposure, stops", -8.0, 8.0, 0.25, 0.0)
+            self._exposure = self._gui.add_slider(
+                "exposure, stops", -8.0, 8.0, 0.25, 0.0, marks=(), hint="from -8 to 8"
+            )
 
         @self._show.on_update
         def _(_: object) -> None:
             self._error_scale.visible = "error" in self.screen.parts
 
-        for each in (self._show, self._resolution, self._curve, self._exposure):
+        settings: list[Any] = [self._show, self._resolution, self._curve, self._exposure]
+        self._at_first = [(each, each.value) for each in settings]
+        for each in settings:
             each.on_update(lambda _: self._on_change())
 
-    def _add_controls(self) -> None:
-        if len(self._controls) > MOST_SLIDERS:
-            self._gui.add_markdown(f"{len(self._controls)} variables: too many for sliders")
+    def _add_inputs(self, controls: Sequence[Control]) -> None:
+        if len(controls) > MOST_SLIDERS:
+            self._gui.add_markdown(f"{len(controls)} variables: too many for sliders")
             return
-        for group, members in groupby(self._controls, key=lambda control: control.group):
+        for group, members in groupby(inputs(controls), key=lambda each: each.group):
             with self._gui.add_folder(group):
-                for control in members:
-                    self._add(control)
+                for each in members:
+                    made = each.add(self._gui, self._v)
+                    made.on_update(lambda _, each=each, made=made: self._read(each, made.value))
+                    self._inputs.append((each, made))
 
-    def _add(self, control: Control) -> None:
-        component = self._v[control.component]
-        if control.choices == Visibility.choices:
-            made: Any = self._gui.add_checkbox(
-                control.name, control.choice(component) == control.choices[1]
-            )
-        elif control.choices:
-            made = self._gui.add_dropdown(
-                control.name, control.choices, initial_value=control.choice(component)
-            )
-        else:
-            made = self._gui.add_slider(
-                control.name,
-                control.low,
-                control.high,
-                10.0 ** -_digits(control),
-                self._as_shown(control),
-            )
-        self._inputs[control.component] = made
-        made.on_update(lambda _: self._read(control))
-
-    def _read(self, control: Control) -> None:
-        """Takes over what a user has set; what `_move` has set says nothing new."""
-        shown = self._inputs[control.component].value
-        if shown == self._as_shown(control):
+    def _read(self, changed: Input, value: Any) -> None:
+        """Takes over what a user has set; what `set_v` has set says nothing new."""
+        if value == changed.shown(self._v):
             return
-        if not control.choices:
-            self._v[control.component] = control.of_value(shown)
-        elif isinstance(shown, bool):
-            self._v[control.component] = control.of_choice(control.choices[shown])
-        else:
-            self._v[control.component] = control.of_choice(shown)
+        for component, number in changed.components(value).items():
+            self._v[component] = number
         self._on_change()
-
-    def _move(self, control: Control) -> None:
-        if control.component in self._inputs:
-            self._inputs[control.component].value = self._as_shown(control)
-
-    def _as_shown(self, control: Control) -> float | str | bool:
-        component = self._v[control.component]
-        if not control.choices:
-            rounded = round(control.value(component), _digits(control))
-            return min(max(rounded, control.low), control.high)
-        choice = control.choice(component)
-        is_switch = isinstance(self._inputs[control.component].value, bool)
-        return choice == control.choices[1] if is_switch else choice
-
-
-def _digits(control: Control) -> int:
-    """After the decimal point, so that a slider has at least `STEPS` values."""
-    return -math.floor(math.log10((control.high - control.low) / STEPS))

@@ -9,8 +9,9 @@ from typing import Any
 
 from torch import Tensor
 
-from ngi.denoise import Denoiser, OpenImageDenoise, OptixDenoise, PathTracing
+from ngi.denoise import Denoiser, OpenImageDenoise, OptixDenoise
 from ngi.evaluate import EvaluationProtocol
+from ngi.methods.path_tracing import PathTracing
 from ngi.render import Renderer
 from ngi.scene import SceneDescription
 from ngi.view.run_settings import describe_scene, make_renderer, plain, read_settings

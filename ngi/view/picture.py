@@ -10,7 +10,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from ngi.options import option, run_tool
+from ngi.config.options import option, run_tool
 
 if TYPE_CHECKING:
     from torch import Tensor

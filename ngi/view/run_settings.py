@@ -10,10 +10,10 @@ from typing import Any
 from hydra.utils import get_object
 from omegaconf import DictConfig, OmegaConf
 
+from ngi.files.resources import root
 from ngi.learn import PatchSamples, Samples
 from ngi.render import Renderer
 from ngi.render.workers import mitsuba_renderer
-from ngi.resources import root
 from ngi.scene import SceneDescription, read_scene, scenes
 from ngi.scene.release import read_release
 
@@ -21,6 +21,14 @@ READERS: dict[str, Callable[..., SceneDescription]] = {
     "ngi.scene.read_scene": read_scene,
     "ngi.scene.release.read_release": read_release,
 }
+
+RENAMED = {
+    "ngi.models.CNSR": "ngi.methods.cnsr.CNSR",
+    "ngi.learn.ObservationSets": "ngi.methods.cnsr.ObservationSets",
+    "ngi.models.AffinityDenoiser": "ngi.methods.anf.AffinityDenoiser",
+    "ngi.learn.Sequences": "ngi.methods.anf.Sequences",
+}
+"""What older runs call something -> what it is called now."""
 
 
 def read_settings(folder: Path) -> dict[str, Any]:
@@ -43,6 +51,8 @@ def made_by(settings: dict[str, Any], group: str) -> Callable[..., Any]:
     A run's folder may be somebody else's, and a `_target_` can name any function there is.
     """
     target = settings[group]["_target_"]
+    if isinstance(target, str):
+        target = RENAMED.get(target, target)
     options = [OmegaConf.load(file) for file in (root() / "conf" / group).glob("*.yaml")]
     known = {option.get("_target_") for option in options if isinstance(option, DictConfig)}
     if not isinstance(target, str) or target not in known:

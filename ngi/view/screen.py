@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from ngi.evaluate.pictures import eight_bit, error_picture
-from ngi.scene.gallery import buffer_picture
+from ngi.view.gallery import buffer_picture
 from ngi.view.scene_view import SceneView
 from ngi.view.tone import shown
 

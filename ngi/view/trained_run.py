@@ -9,8 +9,8 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-from ngi.durable import DamagedError
 from ngi.evaluate import EvaluationProtocol
+from ngi.files.durable import DamagedError
 from ngi.learn import Samples, read_checkpoint
 from ngi.render import Renderer
 from ngi.scene import SceneDescription
@@ -64,7 +64,8 @@ class TrainedRun:
         settings = read_settings(folder)
         if "path_tracing" in settings:
             raise ValueError(
-                f"{folder} has no network: path tracing took its place; ngi.video shows its frames"
+                f"{folder} has no network: path tracing took its place; "
+                "`ngi video` shows its frames"
             )
         checkpoint = newest_checkpoint(folder)
         description = describe_scene(folder, settings, scene_path)

@@ -15,7 +15,9 @@ import viser
 from PIL import Image
 
 from ngi.evaluate import image_metrics
+from ngi.evaluate.pictures import WHITE, side_by_side
 from ngi.render.exr import write_exr
+from ngi.view.camera import Vector
 from ngi.view.panel import Panel
 from ngi.view.scene_view import Place
 from ngi.view.screen import Pixels
@@ -23,8 +25,12 @@ from ngi.view.session import Wish
 from ngi.view.studio import Shown, Studio
 from ngi.view.subject import Subject
 
+SMALL = 128
+"""Pixels a side up to which JPEG would not be faster than PNG, and its colours would run."""
 RATE_OVER = 2.0
 """Seconds over which pictures per second are counted."""
+ECHOES = 200
+"""Views that the page has asked for and a browser may still answer."""
 GREY = 24
 """Of what is beside the picture where the window has another shape."""
 
@@ -41,6 +47,7 @@ class Visitor:
         self._last: Shown | None = None
         self._aspect = 1.0
         self._moments: deque[float] = deque(maxlen=100)
+        self._aims: deque[tuple[Vector, Vector]] = deque(maxlen=ECHOES)
         start = next(iter(subject.presets.values()))
         self._panel = Panel(
             client.gui,
@@ -71,9 +78,9 @@ class Visitor:
 
     def _send(self, shown: Shown) -> None:
         self._last, self._aspect = shown, self._client.camera.aspect
-        self._client.scene.set_background_image(
-            _fitted(shown.pixels, self._aspect), format="png" if shown.full else "jpeg"
-        )
+        pixels = _fitted(_captioned(shown), self._aspect)
+        exactly = shown.full or len(shown.pixels) <= SMALL
+        self._client.scene.set_background_image(pixels, format="png" if exactly else "jpeg")
         self._client.flush()
 
     def _refit(self, mine: viser.CameraHandle) -> None:
@@ -93,19 +100,24 @@ class Visitor:
         assert camera is not None
         origin, target = camera.view(self._panel.v)
         mine = self._client.camera
-        if np.allclose(mine.position, origin, atol=1e-4) and np.allclose(
-            mine.look_at, target, atol=1e-4
-        ):
+        if _same_view((mine.position, mine.look_at), (origin, target)):
             return
+        self._aims.append((origin, target))
         with self._client.atomic():
             mine.up_direction = np.asarray(camera.up)
             mine.position = origin
             mine.look_at = target
 
     def _walk(self, mine: viser.CameraHandle) -> None:
-        """Takes over into v where a mouse has moved the browser's camera."""
+        """Takes over into v where a mouse has moved the browser's camera.
+
+        Where the page has put it, the browser says so some time later: that is no wish of its user.
+        """
         camera = self._subject.camera
         assert camera is not None
+        there = (mine.position, mine.look_at)
+        if any(_same_view(there, aim) for aim in self._aims):
+            return
         v = np.array(self._panel.v)
         moved = camera.components(mine.position, mine.look_at)
         if np.allclose(v[camera.part], moved, atol=1e-3):
@@ -194,6 +206,20 @@ def _exr(shown: Shown) -> bytes:
         path = Path(folder) / "picture.exr"
         write_exr(path, shown.view.reference if traced else shown.view.prediction)
         return path.read_bytes()
+
+
+def _same_view(one: tuple[Vector, Vector], other: tuple[Vector, Vector]) -> bool:
+    """Whether origins and targets are the same, to a browser's precision."""
+    return np.allclose(np.stack(one), np.stack(other), atol=1e-3)
+
+
+def _captioned(shown: Shown) -> Pixels:
+    """Its picture, or several side by side, each under its name."""
+    parts = shown.wish.screen.parts
+    if len(parts) == 1:
+        return shown.pixels
+    pictures = [Image.fromarray(each) for each in np.split(shown.pixels, len(parts), axis=1)]
+    return np.asarray(side_by_side(pictures, parts, paper=(GREY,) * 3, ink=WHITE))
 
 
 def _fitted(pixels: Pixels, aspect: float) -> Pixels:

@@ -1,4 +1,4 @@
-"""What `ngi.video` measured, as the report shows it."""
+"""What `ngi video` measured, as the report shows it."""
 
 import json
 from pathlib import Path

@@ -61,6 +61,15 @@ def test_provenance_as_a_frame_is_cut_nowhere(runs) -> None:
     assert [str(run.folder) for run in runs] == frame["folder"].tolist()
 
 
+def test_of_a_run_that_went_on_with_another_commit_both_are_shown(make_run, tmp_path) -> None:
+    versions = [{"commit": c * 40, "dirty": c == "a", "code": c * 16} for c in "aab"]
+    make_run(change=lambda result: result.update(commits=versions, commit="b" * 40))
+    runs = name_methods(find_runs(tmp_path)[0])
+    (row,) = records(provenance_table(runs))
+    assert (row["commit"], row["changed files"]) == (f"{'a' * 12} then {'b' * 12}", "yes")
+    assert provenance_frame(runs)["commit"].item() == f"{'a' * 40} then {'b' * 40}"
+
+
 def test_machines_are_listed_once(runs) -> None:
     by_method = {row["method"]: row["machine"] for row in records(provenance_table(runs))}
     machines = {row["machine"]: row["what it is"] for row in records(machine_table(runs))}

@@ -139,6 +139,34 @@ def test_several_commits_and_changed_files_are_doubts(make_run, tmp_path) -> Non
     assert "aaaaaaaaaaaa then bbbbbbbbbbbb in" in commits
 
 
+def test_changes_are_told_apart_where_their_program_is_known(make_run, tmp_path) -> None:
+    for seed, code in enumerate("112"):
+        version = {"commit": "a" * 40, "dirty": True, "code": code * 16}
+        make_run(seed=seed, change=set_value("commits", value=[version]))
+    dirty, commits = comparison_warnings(find_runs(tmp_path)[0])
+    assert "3 run(s) were made with uncommitted changes" in dirty
+    assert "commits: aaaaaaaaaaaa and changes (11111111) in" in commits
+    assert "; aaaaaaaaaaaa and changes (22222222) in" in commits
+    assert commits.count(" in ") == 2
+
+
+def test_a_run_that_was_dirty_before_it_went_on_is_a_doubt(make_run, tmp_path) -> None:
+    two = [{"commit": "a" * 40, "dirty": dirty, "code": "1"} for dirty in (True, False)]
+    make_run(change=set_value("commits", value=two))
+    (dirty,) = comparison_warnings(find_runs(tmp_path)[0])
+    assert "1 run(s) were made with uncommitted changes" in dirty
+
+
+def test_commits_that_changed_nothing_of_the_program_are_said_to_be_such(
+    make_run, tmp_path
+) -> None:
+    for seed, commit in enumerate("ab"):
+        version = {"commit": commit * 40, "dirty": False, "code": "1" * 16}
+        make_run(seed=seed, change=set_value("commits", value=[version]))
+    (commits,) = comparison_warnings(find_runs(tmp_path)[0])
+    assert commits.endswith("; the program itself is the same")
+
+
 def test_other_schema_version_is_refused(make_run, tmp_path) -> None:
     make_run()
     folder = make_run(seed=1, change=set_value("schema_version", value=2))

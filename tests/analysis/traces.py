@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ngi.learn.record_log import RecordLog
+from ngi.files.record_log import RecordLog
 
 CHAINS = 16
 

@@ -5,9 +5,10 @@ import sys
 import pytest
 import torch
 
-from ngi.backend import cuda_problem
-from ngi.denoise import OpenImageDenoise, OptixDenoise, PathTracing
+from ngi.denoise import OpenImageDenoise, OptixDenoise
 from ngi.evaluate import mape
+from ngi.machine.backend import cuda_problem
+from ngi.methods.path_tracing import PathTracing
 from ngi.render import AnalyticRenderer
 
 V = torch.tensor([0.3, 0.6, 0.9])

@@ -7,12 +7,15 @@ from dataclasses import fields
 from importlib import import_module
 from importlib.util import find_spec
 from itertools import product
+from os.path import relpath
 from pathlib import Path
 
 import pytest
 
 from ngi.cli import VERBS
-from ngi.configuration import composed
+from ngi.config.command_words import completed
+from ngi.config.configuration import composed
+from tests.config.test_configuration import composed as known_to_hydra
 from tests.docs.pages import ROOT, commands
 
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -23,6 +26,7 @@ OPTIONS = {
     "video": ("ngi.video", "VideoOptions"),
     "export": ("ngi.view.export", "ExportOptions"),
 }
+OPENED = r"\brun=(outputs/\S+)"
 OF_A_TUTORIAL = {"scene=lamp", "sampler=loss_power", "sampler=shrinking"}
 
 
@@ -87,3 +91,21 @@ def test_options_are_those_of_the_verb(verb: str) -> None:
     for command in shown:
         keys = {word.partition("=")[0] for word in words_of(command, verb) or [] if "=" in word}
         assert keys <= known, command
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_a_run_that_is_opened_lies_where_training_has_put_it(
+    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By a command of the same page, or by `make demo`."""
+    shown = {folder for command in commands(page) for folder in re.findall(OPENED, command)}
+    if not shown:
+        return
+    (tmp_path / "lamp").mkdir()  # the tutorial's scene
+    (tmp_path / "lamp" / "scene.yaml").touch()
+    monkeypatch.setenv("NGI_SCENES", str(tmp_path))
+    trained = [words for c in commands(page) if (words := words_of(c, "train")) is not None]
+    jobs = [job for words in trained if "--config-dir" not in words for job in overrides(words)]
+    jobs += [["+sweeps=demo", f"method={name}"] for name in ("uniform", "active_exploration")]
+    folders = {relpath(known_to_hydra(*completed(job)).run.folder) for job in jobs}
+    assert shown <= folders

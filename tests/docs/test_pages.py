@@ -63,7 +63,8 @@ def test_every_verb_has_its_place_in_the_reference(documentation: ModuleType) ->
         module = verb.module.removesuffix(".__main__")
         assert f"`python -m {module}`" in page
         file = ROOT / module.replace(".", "/")
-        source = file / "__main__.py" if file.is_dir() else file.with_suffix(".py")
+        alone = file.with_suffix(".py")
+        source = alone if alone.exists() else file / "__main__.py"
         assert '__name__ == "__main__"' in source.read_text(), "python -m would do nothing"
 
 

@@ -1,7 +1,9 @@
 """The tutorials, as a reader follows them: from an empty folder, block by block."""
 
+import json
 import os
 import re
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -25,6 +27,7 @@ def reader(folder: Path) -> dict[str, str]:
     )
     ngi.chmod(0o755)
     known = environment(folder)
+    known["MPLBACKEND"] = "Agg"  # a notebook leaves the choice to where it is shown
     return {**known, "PATH": os.pathsep.join([str(programs), known["PATH"]])}
 
 
@@ -42,6 +45,20 @@ def composed_only(text: str) -> str:
     return "\n".join(line.replace("ngi train", "ngi train --cfg job") for line in first)
 
 
+def code_of(notebook: Path) -> list[str]:
+    """Its cells of code, in order."""
+    cells = json.loads(notebook.read_text())["cells"]
+    return [cell["source"] for cell in cells if cell["cell_type"] == "code"]
+
+
+def test_the_notebook_is_that_of_its_page() -> None:
+    tool = runpy.run_path(str(ROOT / "tools" / "notebook.py"))
+    page, notebook = tool["PAGE"], tool["NOTEBOOK"]
+    assert notebook.read_text() == tool["text"](page.read_text()), "run tools/notebook.py"
+    python = [block.text.strip() for block in blocks(page) if block.language == "python"]
+    assert code_of(notebook) == python
+
+
 @pytest.mark.parametrize("page", TUTORIALS, ids=lambda page: page.stem)
 def test_a_tutorial_works_as_it_stands_there(page: Path, tmp_path: Path) -> None:
     place, environment = tmp_path / "empty", reader(tmp_path)
@@ -57,5 +74,8 @@ def test_a_tutorial_works_as_it_stands_there(page: Path, tmp_path: Path) -> None
             run(["bash", "-e", "-c", text], cwd=place, env=environment)
         elif block.language == "python":
             script += block.text
+    notebook = page.with_suffix(".ipynb")
+    if notebook.exists():
+        script = "\n".join(code_of(notebook))
     if script:
         run([sys.executable, "-c", script], cwd=place, env=environment)

@@ -42,7 +42,7 @@ def main() -> int:
 
 
 def _build(description: SceneDescription) -> None:
-    from ngi.backend import activate
+    from ngi.machine.backend import activate
     from ngi.scene.variable_scene import VariableScene
 
     activate("scalar")

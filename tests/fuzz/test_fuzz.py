@@ -39,7 +39,7 @@ def test_bad_inputs_are_refused_with_a_message(tmp_path) -> None:
 
 
 def test_what_can_be_read_is_built_or_refused(tmp_path) -> None:
-    from ngi.backend import activate
+    from ngi.machine.backend import activate
 
     def build(description) -> None:
         activate("scalar")
@@ -75,7 +75,7 @@ def test_a_bitmap_without_a_file_does_not_crash_mitsuba(tmp_path) -> None:
     write_seed(tmp_path)
     named = '<string name="filename" value="a.png"/>'
     (tmp_path / "scene.xml").write_text(XML.replace(named, "").replace(f"\n  {named}", ""))
-    with pytest.raises(ValueError, match=r"scene\.xml: <texture type='bitmap'> names no file"):
+    with pytest.raises(ValueError, match=r"scene\.xml, line 12: <texture type='bitmap'"):
         load(read_scene_file(tmp_path / "scene.xml"))
 
 

@@ -22,6 +22,7 @@ SIZE = (
     "reuse.policy.beta=1.0",
     "optimizer.lr=1e-3",
     "evaluation=smoke",
+    "run.linear_megabytes=0",  # closed formulas do without Mitsuba, which is slow to import
 )
 SMALL = (*SIZE, "budget=steps", "budget.steps=12")
 BRIEF = (*SIZE, "budget=seconds", "budget.seconds=2")

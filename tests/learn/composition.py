@@ -2,7 +2,7 @@
 
 from omegaconf import DictConfig, open_dict
 
-from tests.test_configuration import composed
+from tests.config.test_configuration import composed
 
 
 def run_config(*overrides: str) -> DictConfig:

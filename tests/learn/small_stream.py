@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from pathlib import Path
 
+from ngi.clock.phase_clock import PhaseClock
 from ngi.explore import (
     Always,
     ConstantTarget,
@@ -13,12 +14,13 @@ from ngi.explore import (
     NormalPerturbation,
     ProposalDistribution,
     ResolutionSchedule,
+    Sampler,
+    Target,
 )
 from ngi.learn.batch import Batch, Feedback
-from ngi.learn.clock import PhaseClock
 from ngi.learn.samples import PatchSamples
 from ngi.learn.stream import TrainingStream
-from ngi.render import AnalyticRenderer
+from ngi.render import AnalyticRenderer, PocketRenderer
 from ngi.reuse import DrawingRule, FixedProbability, PatchArchive, PatchStore, ReusePolicy
 
 CHAINS = 4
@@ -32,24 +34,27 @@ def make(
     folder: Path,
     *,
     greedy: bool = True,
+    target: Target | None = None,
+    sampler: Sampler | None = None,
     proposal: ProposalDistribution | None = None,
     policy: ReusePolicy | None = None,
     rule: DrawingRule | None = None,
     schedule: ResolutionSchedule | None = None,
     capacity: int = 64,
     seed: int = 0,
-    renderer: AnalyticRenderer | None = None,
+    renderer: AnalyticRenderer | PocketRenderer | None = None,
     when_late: str = "wait",
     clock: PhaseClock | None = None,
 ) -> TrainingStream:
     renderer = renderer or AnalyticRenderer(dimensions=3, patch_size=8)
     return TrainingStream(
         samples=PatchSamples(renderer=renderer),
-        sampler=MarkovChains(
+        sampler=sampler
+        or MarkovChains(
             chains=CHAINS,
             proposal=proposal
             or NormalPerturbation(large_step_probability=0.3, standard_deviation=0.05),
-            target=Loss() if greedy else ConstantTarget(),
+            target=target or (Loss() if greedy else ConstantTarget()),
             acceptance=Greedy(accept_equal=False) if greedy else Always(),
         ),
         store=PatchStore(capacity=capacity, layout=renderer.layout, rule=rule),
@@ -67,7 +72,7 @@ def answer(batch: Batch) -> Feedback:
     losses = batch.patches.log_radiance.mean(dim=(1, 2, 3))
     if batch.current is None:
         return Feedback(losses, None, None)
-    return Feedback(losses, lambda: losses, batch.current.log_radiance.mean(dim=(1, 2, 3)))
+    return Feedback(losses, losses, batch.current.log_radiance.mean(dim=(1, 2, 3)))
 
 
 def steps(stream: TrainingStream, count: int) -> Iterator[Batch]:

@@ -3,8 +3,8 @@
 import io
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from itertools import islice
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -14,9 +14,11 @@ from ngi.explore import GrowingResolution, LossTimesStep
 from ngi.learn import (
     IlluminationModule,
     PhaseClock,
+    StepGuard,
     TrainingStream,
     patch_example,
     seeded,
+    training_step,
 )
 from ngi.learn.ahead import ProposalsAhead
 from ngi.learn.batch import Batch
@@ -48,8 +50,8 @@ def in_turn() -> AnalyticRenderer:
     return AnalyticRenderer(dimensions=3, patch_size=12, noise=0.1)
 
 
-def network() -> IlluminationModule:
-    module: Any = IlluminationModule(
+def learner(stream: TrainingStream) -> IlluminationModule:
+    return IlluminationModule(
         network=seeded(PixelGenerator, seed=0)(
             layout=in_turn().layout,
             scene_dimensions=3,
@@ -58,27 +60,17 @@ def network() -> IlluminationModule:
         ),
         loss=L1Dssim(l1_weight=1.0, dssim_weight=1.0),
         optimizer=lambda parameters: torch.optim.Adam(parameters, lr=1e-2),
-        target=LossTimesStep(),
-        clock=PhaseClock(),
         example=patch_example,
+        stream=stream,
+        guard=StepGuard(stream=stream, folder=Path()),
     )
-    optimizer = module.configure_optimizers()
-    module.optimizers = lambda **_: optimizer
-    module._trainer = SimpleNamespace(global_step=0)
-    return module
 
 
 def train(stream: TrainingStream, module: IlluminationModule, count: int) -> Iterator[Batch]:
     """The stream's batches, each trained on before the next one."""
-    optimizer: Any = module.optimizers()
-    batches = iter(stream)
-    for index in range(count):
-        batch = next(batches)
-        outputs = module.training_step(batch, index)
-        optimizer.zero_grad()
-        outputs["loss"].backward()
-        optimizer.step()
-        stream.feedback(outputs["feedback"])
+    optimizer = module.configure_optimizers()
+    for batch in islice(stream, count):
+        training_step(batch, module.learner, optimizer=optimizer)
         yield batch
 
 
@@ -97,10 +89,16 @@ def test_ahead_and_in_turn_give_the_same_numbers(
 ) -> None:
     renderers = (in_turn(), in_thread)
     turn, ahead = (
-        make(tmp_path / str(i), policy=policy, renderer=renderer, schedule=GROWING)
+        make(
+            tmp_path / str(i),
+            policy=policy,
+            renderer=renderer,
+            schedule=GROWING,
+            target=LossTimesStep(),
+        )
         for i, renderer in enumerate(renderers)
     )
-    turn_network, ahead_network = network(), network()
+    turn_network, ahead_network = learner(turn), learner(ahead)
     before = turn_network.network.state_dict()["output_layer.weight"].clone()
     pairs = zip(train(turn, turn_network, 30), train(ahead, ahead_network, 30), strict=True)
     for a, b in pairs:

@@ -10,9 +10,9 @@ from ngi.explore import ChainInfo, Proposals
 from ngi.learn.chain_trace import chain_record
 from ngi.patches import Patches
 from ngi.reuse import Never
+from tests.files.test_record_log import read
 from tests.learn.command_line import run
 from tests.learn.small_stream import CHAINS, answer, make, steps
-from tests.learn.test_record_log import read
 
 
 def states_of(patches: Patches) -> np.ndarray:

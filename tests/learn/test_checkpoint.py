@@ -13,9 +13,9 @@ import pandas as pd
 import pytest
 import torch
 
+from ngi.files.row_log import RowLog
 from ngi.learn import RunFolder, prepare_resume
 from ngi.learn.checkpoint import AtomicCheckpointIO
-from ngi.learn.row_log import RowLog
 from tests.learn.comparison import assert_same_run
 from tests.learn.forked import configuration, run
 

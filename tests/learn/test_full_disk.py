@@ -15,8 +15,8 @@ from typing import Any
 
 import pytest
 
+from ngi.files.growing_file import GrowingFile
 from ngi.learn import RecordLog, RowLog
-from ngi.learn.growing_file import GrowingFile
 from tests.learn.comparison import assert_same_run
 from tests.learn.forked import configuration, run
 

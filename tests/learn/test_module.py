@@ -1,13 +1,34 @@
 from contextlib import nullcontext
+from functools import partial
+from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 import torch
 from torch.func import grad
 
 from ngi.explore import Loss, LossTimesOutputGradient, LossTimesStep, Target
-from ngi.learn import Batch, IlluminationModule, PhaseClock, patch_example, seeded
-from ngi.models import L1Dssim, PixelGenerator, exponential_average, sample_step_norm
+from ngi.learn import (
+    Batch,
+    Counters,
+    Feedback,
+    IlluminationModule,
+    PhaseClock,
+    StepGuard,
+    patch_example,
+    seeded,
+    training_step,
+)
+from ngi.models import (
+    Averaging,
+    EncodedGenerator,
+    L1Dssim,
+    PixelGenerator,
+    exponential_average,
+    no_average,
+    sample_step_norm,
+)
 from ngi.patches import BufferLayout, Patches
 
 LAYOUT = BufferLayout()
@@ -30,25 +51,52 @@ def patches(count: int, seed: int, dtype: torch.dtype = torch.float64) -> Patche
     )
 
 
-def module(target: Target) -> IlluminationModule:
-    network = seeded(PixelGenerator, seed=3)(
+NETWORKS = {
+    "the paper's": PixelGenerator,
+    "ours": partial(EncodedGenerator, octaves=1, directions=True),
+}
+
+
+class Answered:
+    """In the stream's place: what it was told of each step."""
+
+    def __init__(self, target: Target) -> None:
+        self.sampler = SimpleNamespace(target=target)
+        self.clock = PhaseClock()
+        self.counters = Counters()
+        self.feedbacks: list[Feedback] = []
+
+    def feedback(self, feedback: Feedback) -> None:
+        self.feedbacks.append(feedback)
+
+
+def module(
+    target: Target, network_name: str = "the paper's", averaging: Averaging = no_average
+) -> IlluminationModule:
+    network = seeded(NETWORKS[network_name], seed=3)(
         layout=LAYOUT, scene_dimensions=2, hidden_features=8, hidden_layers=2
     ).double()
-    made = IlluminationModule(
+    stream: Any = Answered(target)
+    return IlluminationModule(
         network=network,
         loss=LOSS,
         optimizer=lambda parameters: torch.optim.Adam(parameters, lr=1e-2),
-        target=target,
-        clock=PhaseClock(),
         example=patch_example,
+        stream=stream,
+        guard=StepGuard(stream=stream, folder=Path()),
+        averaging=averaging,
     )
-    optimizer = made.configure_optimizers()
-    made.optimizers = lambda **_: optimizer  # type: ignore[method-assign]
-    made._trainer = SimpleNamespace(global_step=0)  # type: ignore[assignment]
-    return made
 
 
-def direct_scores(made: IlluminationModule, target: Target, samples: Patches) -> torch.Tensor:
+def one_step(made: IlluminationModule, batch: Batch) -> Feedback:
+    """What the stream is told of a first step; the gradients stay."""
+    training_step(batch, made.learner, optimizer=made.configure_optimizers())
+    return made.learner.stream.feedbacks[-1]  # type: ignore[attr-defined]
+
+
+def direct_scores(
+    made: IlluminationModule, target: Target, samples: Patches, optimizer: torch.optim.Optimizer
+) -> torch.Tensor:
     """The definition of each target density, sample by sample."""
     output = made.network(samples.buffers, samples.scene_vector).detach()
     losses = LOSS(output, samples.log_radiance)
@@ -58,7 +106,7 @@ def direct_scores(made: IlluminationModule, target: Target, samples: Patches) ->
         _, norms = sample_step_norm(
             made.network,
             LOSS,
-            made.optimizers(),  # type: ignore[arg-type]
+            optimizer,
             (samples.buffers, samples.scene_vector),
             samples.log_radiance,
         )
@@ -72,70 +120,62 @@ def direct_scores(made: IlluminationModule, target: Target, samples: Patches) ->
     return losses * norms
 
 
+@pytest.mark.parametrize("network", NETWORKS)
 @pytest.mark.parametrize("target", [Loss(), LossTimesStep(), LossTimesOutputGradient()])
-def test_proposed_and_current_are_scored_under_the_same_weights(target: Target) -> None:
-    made = module(target)
-    optimizer = made.optimizers()
+def test_proposed_and_current_are_scored_under_the_same_weights(
+    target: Target, network: str
+) -> None:
+    made = module(target, network)
+    optimizer = made.configure_optimizers()
     for step in range(3):
-        batch = Batch(patches(4, 2 * step), torch.arange(4), True, patches(4, 2 * step + 1))
-        expected = [
-            direct_scores(made, target, p) for p in (batch.patches, batch.current) if p is not None
-        ]
-        answer = made.training_step(batch, step)
-        optimizer.zero_grad()  # type: ignore[union-attr]
-        answer["loss"].backward()
-        optimizer.step()  # type: ignore[union-attr]
-        feedback = answer["feedback"]
-        torch.testing.assert_close(feedback.target_proposed().double(), expected[0])
+        proposed, current = patches(4, 2 * step), patches(4, 2 * step + 1)
+        expected = [direct_scores(made, target, p, optimizer) for p in (proposed, current)]
+        batch = Batch(proposed, torch.arange(4), True, current)
+        loss = training_step(batch, made.learner, optimizer=optimizer).loss
+        feedback = made.learner.stream.feedbacks[-1]  # type: ignore[attr-defined]
+        torch.testing.assert_close(feedback.target_proposed.double(), expected[0])
         torch.testing.assert_close(feedback.target_current.double(), expected[1])
-        torch.testing.assert_close(answer["loss"], feedback.losses.mean())
+        assert loss == pytest.approx(feedback.losses.mean().item())
 
 
 def test_scoring_does_not_change_the_gradient() -> None:
     gradients = []
     for current in (None, patches(4, 9)):
         made = module(LossTimesStep())
-        made.training_step(Batch(patches(4, 0), torch.arange(4), True, current), 0)[
-            "loss"
-        ].backward()
+        one_step(made, Batch(patches(4, 0), torch.arange(4), True, current))
         gradients.append([p.grad for p in made.network.parameters()])
     for a, b in zip(*gradients, strict=True):
         torch.testing.assert_close(a, b, rtol=1e-10, atol=1e-14)
 
 
 def test_weights_scale_what_each_sample_does_and_not_what_is_said_of_it() -> None:
-    made, samples = module(Loss()), patches(4, 0)
-    weights = torch.tensor([1.0, 0.25, 0.5, 0.0])
-    step = made.training_step(Batch(samples, torch.arange(4), False, None, weights), 0)
-    plain = made.training_step(Batch(samples, torch.arange(4), False, None), 0)
-    assert torch.equal(step["feedback"].losses, plain["feedback"].losses)
-    parameters = list(made.parameters())
-    found = torch.autograd.grad(step["loss"], parameters)
-    losses = LOSS(made.network(samples.buffers, samples.scene_vector), samples.log_radiance)
+    samples, weights = patches(4, 0), torch.tensor([1.0, 0.25, 0.5, 0.0])
+    weighted, plain, reference = module(Loss()), module(Loss()), module(Loss())
+    told = one_step(weighted, Batch(samples, torch.arange(4), False, None, weights))
+    told_plain = one_step(plain, Batch(samples, torch.arange(4), False, None))
+    assert torch.equal(told.losses, told_plain.losses)
+    network = reference.network
+    losses = LOSS(network(samples.buffers, samples.scene_vector), samples.log_radiance)
     mean = sum(w * loss for w, loss in zip(weights.tolist(), losses, strict=True)) / 4
-    for ours, expected in zip(found, torch.autograd.grad(mean, parameters), strict=True):
-        torch.testing.assert_close(ours, expected)
+    gradients = torch.autograd.grad(mean, list(network.parameters()))
+    for parameter, expected in zip(weighted.network.parameters(), gradients, strict=True):
+        torch.testing.assert_close(parameter.grad, expected)
 
 
 def test_after_each_step_the_average_follows_and_is_what_predicts() -> None:
-    made = module(Loss())
-    made.averaged = exponential_average(made.network, decay=0.98)
+    made = module(Loss(), averaging=partial(exponential_average, decay=0.98))
     reference = exponential_average(made.network, decay=0.98)
     batch = Batch(patches(4, 0), torch.arange(4), False, None)
-
-    def closure() -> torch.Tensor:
-        loss = made.training_step(batch, 0)["loss"]
-        loss.backward()
-        return loss
-
+    optimizer = made.configure_optimizers()
+    for _ in range(3):
+        training_step(batch, made.learner, optimizer=optimizer)
+        reference.update_parameters(made.network)
+    assert made.averaged is not None
+    for ours, expected in zip(made.averaged.parameters(), reference.parameters(), strict=True):
+        assert torch.equal(ours, expected)
     made._trainer = SimpleNamespace(  # type: ignore[assignment]
         precision_plugin=SimpleNamespace(forward_context=nullcontext)
     )
-    for step in range(3):
-        made.optimizer_step(0, step, made.optimizers(), closure)
-        reference.update_parameters(made.network)
-    for ours, expected in zip(made.averaged.parameters(), reference.parameters(), strict=True):
-        assert torch.equal(ours, expected)
     inputs = (batch.patches.buffers[0], batch.patches.scene_vector[0])
     expected = reference.module.render(*inputs).float()
     assert torch.equal(made.predict(*inputs), expected)

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from ngi.learn import Budget, Interruption, PhaseClock, TrainingStream
+from ngi.learn import Budget, Interruption, PhaseClock, Run, Step, TrainingStream
 from ngi.learn.callbacks import PeriodicEvaluation
 from ngi.learn.saving import BudgetAndCheckpoint
 from ngi.learn.schedule import ConstantRate
@@ -30,13 +30,28 @@ def late(folder: Path) -> tuple[TrainingStream, ManualJob, PhaseClock]:
     return stream, renderer.jobs[-1], clock
 
 
+def run(stream: TrainingStream, *, steps: int, folder: Any = None) -> Run:
+    """With what these callbacks ask for."""
+    nothing: Any = None
+    return Run(
+        folder=folder,
+        tracker=nothing,
+        interruption=Interruption(of="a run"),
+        budget=Budget(steps=steps),
+        schedule=ConstantRate(),
+        renderer=nothing,
+        samples=nothing,
+        stream=stream,
+        module=nothing,
+        run_clock=stream.clock,
+    )
+
+
 def test_an_evaluation_waits_in_run_time_for_patches_under_way(tmp_path: Path) -> None:
     stream, job, clock = late(tmp_path)
     seen = []
     recorder: Any = SimpleNamespace(evaluate=lambda: seen.append(job.done()))
-    evaluation = PeriodicEvaluation(
-        recorder=recorder, count=2, budget=Budget(steps=8), stream=stream, run_clock=clock
-    )
+    evaluation = PeriodicEvaluation(run(stream, steps=8), recorder=recorder, count=2)
     evaluation.on_train_batch_end()
     assert seen == [True]
     assert clock.seconds["render"] == clock.run_seconds == 5
@@ -58,19 +73,11 @@ def test_a_checkpoint_waits_for_patches_unless_the_run_is_over(
         should_stop=False, save_checkpoint=lambda _: seen.append(job.done())
     )
     callback = BudgetAndCheckpoint(
-        budget=Budget(steps=budget),
-        schedule=ConstantRate(),
-        stream=stream,
-        clock=clock,
-        run_clock=clock,
-        folder=folder,
-        every_seconds=1e9,
-        every_steps=5,
-        interruption=Interruption(of="a run"),
+        run(stream, steps=budget, folder=folder), every_seconds=1e9, every_steps=5
     )
     callback.on_train_start(trainer)
     module: Any = None
-    callback.on_train_batch_end(trainer, module, {"loss": 1.0})
+    callback.on_train_batch_end(trainer, module, {"step": Step(loss=1.0, gradient_norm=1.0)})
     callback.on_train_end()
     assert seen == [waits]
     assert clock.run_seconds == (5 if waits else 0)

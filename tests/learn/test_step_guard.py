@@ -18,7 +18,6 @@ from ngi.explore import LossTimesStep
 from ngi.learn import (
     ExplorationDataModule,
     IlluminationModule,
-    PhaseClock,
     StepGuard,
     patch_example,
     seeded,
@@ -51,13 +50,14 @@ class OddLoss:
         return self.disturb(step, LOSS(prediction, target))
 
 
-class Feedback(Callback):
+class Weights(Callback):
+    """Of the network after each step."""
+
     def __init__(self, stream: TrainingStream) -> None:
         self.stream = stream
         self.weights: list[Tensor] = []
 
-    def on_train_batch_end(self, _trainer, module, outputs, *_) -> None:
-        self.stream.feedback(outputs["feedback"])
+    def on_train_batch_end(self, _trainer, module, *_) -> None:
         self.weights.append(torch.cat([p.detach().flatten() for p in module.parameters()]))
 
 
@@ -75,8 +75,8 @@ def train(
     callbacks: Sequence[Callback] = (),
     optimizer: OptimizerFactory = ADAM,
     features: int = 8,
-) -> Feedback:
-    stream = make(folder, greedy=True, renderer=renderer)
+) -> Weights:
+    stream = make(folder, renderer=renderer, target=LossTimesStep())
     module = IlluminationModule(
         network=seeded(PixelGenerator, seed=0)(
             layout=AnalyticRenderer(dimensions=3, patch_size=8).layout,
@@ -86,14 +86,14 @@ def train(
         ),
         loss=OddLoss(losses, stream),
         optimizer=optimizer,
-        target=LossTimesStep(),
-        clock=PhaseClock(),
         example=patch_example,
+        stream=stream,
+        guard=StepGuard(stream=stream, folder=folder),
     )
-    count = iter(range(1, steps + 1))
-    module.network.output_layer.weight.register_hook(lambda g: gradient(next(count), g))
-    feedback = Feedback(stream)
-    guard = StepGuard(stream=stream, folder=folder)
+    module.network.output_layer.weight.register_hook(
+        lambda g: gradient(stream.counters.iteration + 1, g)
+    )
+    weights = Weights(stream)
     trainer = Trainer(
         max_steps=steps,
         accelerator="cpu",
@@ -101,14 +101,10 @@ def train(
         enable_checkpointing=False,
         enable_progress_bar=False,
         enable_model_summary=False,
-        callbacks=[
-            guard,
-            feedback,
-            *callbacks,
-        ],
+        callbacks=[weights, *callbacks],
     )
     trainer.fit(module, ExplorationDataModule(stream=stream))
-    return feedback
+    return weights
 
 
 def at(step: int, value: float) -> Disturbance:
@@ -129,13 +125,13 @@ def test_a_harmful_gradient_is_refused_and_named_and_training_goes_on(
     tmp_path: Path, value: float, caplog: pytest.LogCaptureFixture
 ) -> None:
     with caplog.at_level(logging.WARNING, logger="ngi"):
-        feedback = train(tmp_path, 12, gradient=at(6, value))
-    assert feedback.stream.counters.steps_refused == 1
+        trained = train(tmp_path, 12, gradient=at(6, value))
+    assert trained.stream.counters.steps_refused == 1
     assert "step 6 is not taken" in caplog.text
     assert "network.output_layer.weight" in caplog.text
-    assert torch.equal(feedback.weights[5], feedback.weights[4])
-    assert all(not torch.equal(a, b) for a, b in pairwise(feedback.weights[5:]))
-    assert feedback.weights[-1].isfinite().all()
+    assert torch.equal(trained.weights[5], trained.weights[4])
+    assert all(not torch.equal(a, b) for a, b in pairwise(trained.weights[5:]))
+    assert trained.weights[-1].isfinite().all()
     assert not (tmp_path / "refused_step.pt").exists()
 
 
@@ -144,11 +140,11 @@ def test_a_loss_that_is_not_finite_is_refused_and_names_its_patch(
     tmp_path: Path, value: float, caplog: pytest.LogCaptureFixture
 ) -> None:
     with caplog.at_level(logging.WARNING, logger="ngi"):
-        feedback = train(tmp_path, 8, losses=at(2, value))
-    assert feedback.stream.counters.steps_refused == 1
+        trained = train(tmp_path, 8, losses=at(2, value))
+    assert trained.stream.counters.steps_refused == 1
     assert f"the loss of samples [1] (patches [5] of the store) is [{value}]" in caplog.text
-    assert feedback.stream.store.non_finite_losses == 1
-    assert feedback.weights[-1].isfinite().all()
+    assert trained.stream.store.non_finite_losses == 1
+    assert trained.weights[-1].isfinite().all()
 
 
 def test_a_large_gradient_is_scaled_down_to_the_average_and_taken(tmp_path: Path) -> None:
@@ -159,10 +155,10 @@ def test_a_large_gradient_is_scaled_down_to_the_average_and_taken(tmp_path: Path
             states = trainer.optimizers[0].state.values()
             squares.append(sum((state["exp_avg_sq"].sum() for state in states), torch.zeros(())))
 
-    feedback = train(tmp_path, 6, gradient=at(4, LARGEST_NORM / 4), callbacks=[Moments()])
-    counters = feedback.stream.counters
+    trained = train(tmp_path, 6, gradient=at(4, LARGEST_NORM / 4), callbacks=[Moments()])
+    counters = trained.stream.counters
     assert (counters.steps_refused, counters.steps_scaled) == (0, 1)
-    assert not torch.equal(feedback.weights[3], feedback.weights[2])
+    assert not torch.equal(trained.weights[3], trained.weights[2])
     gained = squares[3] - 0.999 * squares[2]  # (1 - beta2) times the squared norm
     first = squares[0]  # the average moves little in four steps
     assert 0.3 < gained / first < 3
@@ -176,7 +172,7 @@ def test_a_large_gradient_is_no_more_than_an_average_one_to_muon(tmp_path: Path)
             states = trainer.optimizers[0].state.values()
             momenta.append(sum(float(s["momentum_buffer"].norm()) for s in states if len(s) == 1))
 
-    feedback = train(
+    trained = train(
         tmp_path,
         6,
         gradient=at(4, LARGEST_NORM / 4),
@@ -184,8 +180,8 @@ def test_a_large_gradient_is_no_more_than_an_average_one_to_muon(tmp_path: Path)
         optimizer=MuonAdam,
         features=12,
     )
-    assert feedback.stream.counters.steps_scaled == 1
-    assert feedback.weights[-1].isfinite().all()
+    assert trained.stream.counters.steps_scaled == 1
+    assert trained.weights[-1].isfinite().all()
     assert momenta[3] < 2 * momenta[2]
 
 
@@ -247,8 +243,8 @@ def test_refusals_with_steps_between_them_do_not_stop_the_run(tmp_path: Path) ->
     def every_second(step: int, losses: Tensor) -> Tensor:
         return losses * (math.nan if step % 2 else 1)
 
-    feedback = train(tmp_path, 3 * REFUSED_IN_A_ROW, losses=every_second)
-    assert feedback.stream.counters.steps_refused == 1.5 * REFUSED_IN_A_ROW
+    trained = train(tmp_path, 3 * REFUSED_IN_A_ROW, losses=every_second)
+    assert trained.stream.counters.steps_refused == 1.5 * REFUSED_IN_A_ROW
 
 
 class BrokenRenderer(AnalyticRenderer):
@@ -273,12 +269,12 @@ def test_patches_that_are_not_finite_are_replaced_and_named(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     with caplog.at_level(logging.WARNING, logger="ngi"):
-        feedback = train(tmp_path, 10, renderer=BrokenRenderer(calls={2, 3}))
-    assert feedback.stream.counters.batches_refused == 2
-    assert feedback.stream.counters.steps_refused == 0
+        trained = train(tmp_path, 10, renderer=BrokenRenderer(calls={2, 3}))
+    assert trained.stream.counters.batches_refused == 2
+    assert trained.stream.counters.steps_refused == 0
     assert caplog.text.count("NaN or Inf in the patches of the states [[0.") == 2
     assert "resolution 24, seed " in caplog.text
-    store = feedback.stream.store
+    store = trained.stream.store
     assert store.get(store.ids).log_radiance.isfinite().all()
 
 

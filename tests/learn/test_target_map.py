@@ -14,9 +14,9 @@ from ngi.learn.target_map import map_states
 from ngi.models import L1Dssim, PixelGenerator
 from ngi.patches import Patches
 from ngi.render import AnalyticRenderer
+from tests.files.test_record_log import read
 from tests.learn.command_line import SMALL, start
 from tests.learn.comparison import assert_same
-from tests.learn.test_record_log import read
 
 CELLS, POSITIONS = 3, 2
 

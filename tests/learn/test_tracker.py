@@ -1,8 +1,9 @@
-"""Weights & Biases may raise, hang or be missing: the run does not notice, and its log says so."""
+"""Trackers may raise, hang or be missing: the run does not notice, and its log says so."""
 
 from __future__ import annotations
 
 import logging
+import math
 import re
 import sys
 import threading
@@ -12,10 +13,22 @@ from types import SimpleNamespace
 
 import pytest
 
-from ngi.learn import WeightsAndBiases, aside, tracker
-from tests.render.odd_renderer import wait_for
+from ngi.learn import MLflow, TensorBoard, WeightsAndBiases, aside, lightning_trackers
+from ngi.learn import remote_tracker as remote
 
-LABEL = {"experiment": "e", "scene": "s", "sampler": "m", "seed": 0}
+LABEL = {
+    "scene": "s",
+    "method": None,
+    "sampler": "m",
+    "budget": "b",
+    "overrides": "default",
+    "seed": 0,
+}
+
+
+class FakeArtifact:
+    def __init__(self, name: str, *, type: str) -> None:
+        pass
 
 
 class FakeWandb:
@@ -26,6 +39,10 @@ class FakeWandb:
         self.rows: list[dict] = []
         self.calls: list[str] = []
         self.Settings = SimpleNamespace
+        self.define_metric = lambda *_, **__: None
+        self.id = "abc"
+        self.Artifact = FakeArtifact
+        self.log_artifact = lambda _: None
 
     def init(self, **_):
         self._called("init")
@@ -43,6 +60,10 @@ class FakeWandb:
         self._trouble(what.split()[0])
 
 
+def wandb_tracker(*, mode: str = "offline", every: int = 1) -> WeightsAndBiases:
+    return WeightsAndBiases(project="p", mode=mode, network=False, options={}, every=every)
+
+
 @pytest.fixture
 def watch(monkeypatch, tmp_path):
     """Starts a tracker on a fake wandb."""
@@ -50,7 +71,7 @@ def watch(monkeypatch, tmp_path):
     def start(trouble=lambda _: None):
         wandb = FakeWandb(trouble)
         monkeypatch.setitem(sys.modules, "wandb", wandb)
-        watched = WeightsAndBiases(project="p", mode="online")
+        watched = wandb_tracker(mode="online")
         watched.start(folder=tmp_path, settings={}, label=LABEL)
         return wandb, watched
 
@@ -60,11 +81,11 @@ def watch(monkeypatch, tmp_path):
 def test_rows_arrive_in_order_without_what_is_empty(watch, caplog) -> None:
     wandb, watched = watch()
     for step in range(100):
-        watched.log({"step": step, "loss": None if step % 2 else 0.5})
+        watched.step({"step": step, "loss": None if step % 2 else 0.5})
     watched.finish(failed=True)
     watched.finish(failed=True)  # whatever happens
     assert [row["step"] for row in wandb.rows] == list(range(100))
-    assert ("loss" in wandb.rows[0], "loss" in wandb.rows[1]) == (True, False)
+    assert [("train/loss" in row) for row in wandb.rows[:2]] == [True, False]
     assert wandb.calls[-1] == "finish 1"
     assert not caplog.records
 
@@ -73,11 +94,11 @@ def test_a_row_is_logged_as_it_was(watch) -> None:
     gate = threading.Event()
     wandb, watched = watch(lambda _: gate.wait(60))
     row = {"step": 1, "loss": 0.5}
-    watched.log(row)
+    watched.step(row)
     row["step"] = 2
     gate.set()
     watched.finish(failed=False)
-    assert wandb.rows == [{"step": 1, "loss": 0.5}]
+    assert wandb.rows == [{"step": 1, "train/loss": 0.5}]
 
 
 @pytest.mark.parametrize("where", ["init", "log", "finish"])
@@ -89,7 +110,7 @@ def test_what_fails_is_said_once(watch, caplog, tmp_path: Path, where, error) ->
 
     wandb, watched = watch(trouble)
     for step in range(5):
-        watched.log({"step": step})
+        watched.step({"step": step})
     watched.finish(failed=False)
     (record,) = caplog.records
     assert record.levelno == logging.WARNING
@@ -100,14 +121,14 @@ def test_what_fails_is_said_once(watch, caplog, tmp_path: Path, where, error) ->
 
 
 def test_what_hangs_holds_nothing_up(watch, caplog, monkeypatch) -> None:
-    monkeypatch.setattr(tracker, "FINISH_SECONDS", 0.1)
-    monkeypatch.setattr(tracker, "LEEWAY_SECONDS", 0.1)
+    monkeypatch.setattr(remote, "FINISH_SECONDS", 0.1)
+    monkeypatch.setattr(remote, "LEEWAY_SECONDS", 0.1)
     monkeypatch.setattr(aside, "CAPACITY", 50)
     gate = threading.Event()
     wandb, watched = watch(lambda what: gate.wait(60) if what == "log" else None)
     begun = time.monotonic()
     for step in range(2000):
-        watched.log({"step": step})
+        watched.step({"step": step})
     logged = time.monotonic()
     watched.finish(failed=False)
     ended = time.monotonic()
@@ -128,7 +149,7 @@ def test_rows_go_on_where_the_network_comes_back(watch, caplog) -> None:
     gate = threading.Event()
     wandb, watched = watch(lambda what: gate.wait(60) if what == "init" else None)
     for step in range(50):
-        watched.log({"step": step})
+        watched.step({"step": step})
     assert wandb.rows == []
     gate.set()
     watched.finish(failed=False)
@@ -138,18 +159,83 @@ def test_rows_go_on_where_the_network_comes_back(watch, caplog) -> None:
 
 def test_without_wandb_the_run_does_not_start(monkeypatch, tmp_path) -> None:
     monkeypatch.setitem(sys.modules, "wandb", None)  # as if it were not installed
-    watched = WeightsAndBiases(project="p", mode="offline")
+    watched = wandb_tracker()
     with pytest.raises(RuntimeError, match=r"tracker=wandb: .* choose tracker=local"):
         watched.start(folder=tmp_path, settings={}, label=LABEL)
     watched.finish(failed=True)
 
 
-def test_the_real_one_runs_offline(tmp_path, caplog) -> None:
-    watched = WeightsAndBiases(project="p", mode="offline")
-    watched.start(folder=tmp_path, settings={"a": 1}, label=LABEL)
-    for step in range(3):
-        watched.log({"step": step, "loss": 0.5})
+def test_one_of_several_steps_is_passed_on(monkeypatch, tmp_path) -> None:
+    wandb = FakeWandb()
+    monkeypatch.setitem(sys.modules, "wandb", wandb)
+    watched = wandb_tracker(every=3)
+    watched.start(folder=tmp_path, settings={}, label=LABEL)
+    for step in range(1, 10):
+        watched.step({"step": step, "loss": 0.5})
     watched.finish(failed=False)
-    assert not [record for record in caplog.records if "Weights" in record.message]
-    (file,) = tmp_path.rglob("*.wandb")
-    wait_for(lambda: file.stat().st_size > 500)  # its service writes it in a process of its own
+    assert [row["step"] for row in wandb.rows] == [3, 6, 9]
+
+
+def test_no_step_at_all_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"tracker\.every: 0; expected at least 1"):
+        wandb_tracker(every=0)
+
+
+@pytest.mark.parametrize(
+    "watched",
+    [
+        TensorBoard(options={}, every=1),
+        MLflow(uri="sqlite://", experiment="e", options={}, every=1),
+    ],
+    ids=["tensorboard", "mlflow"],
+)
+def test_what_to_install_is_said(monkeypatch, tmp_path, watched) -> None:
+    monkeypatch.setattr(lightning_trackers, "find_spec", lambda _: None)
+    name = type(watched).extra
+    message = rf"tracker={name}: {name} is not installed; `pip install -e \.\[{name}\]`"
+    with pytest.raises(RuntimeError, match=message):
+        watched.start(folder=tmp_path, settings={}, label=LABEL)
+    watched.finish(failed=True)
+
+
+def test_an_id_is_made_once_and_stays(tmp_path) -> None:
+    ids = iter("abc")
+    assert remote.kept_id(tmp_path, "wandb", lambda: next(ids)) == "a"
+    assert remote.kept_id(tmp_path, "mlflow", lambda: next(ids)) == "b"
+    assert remote.kept_id(tmp_path, "wandb", lambda: next(ids)) == "a"
+
+
+def test_runs_belong_together_by_sweep_experiment_or_budget() -> None:
+    for options, expected in (
+        ({"sweeps": "cnsr", "experiment": "demo"}, "cnsr"),
+        ({"experiment": "demo"}, "demo"),
+        ({"experiment": None}, "b"),
+    ):
+        assert remote.group(LABEL, options) == expected
+    assert [remote.job_type({**LABEL, "method": m}) for m in ("ours", None)] == ["ours", "m"]
+
+
+def test_the_lowest_value_is_that_of_all_rows_and_nan_is_none(tmp_path) -> None:
+    (tmp_path / "metrics.csv").write_text("step,hard_mape,hard_lpips,a\n1,0.3,,1\n2,0.5,,1\n")
+    told = []
+
+    class Told(WeightsAndBiases):
+        def _begin(self, folder, settings, label) -> None:
+            pass
+
+        def _log(self, row) -> None:
+            told.append(row)
+
+        def _end(self, *, failed) -> None:
+            pass
+
+        def _keep(self) -> None:
+            pass
+
+    watched = Told(project="p", mode="offline", network=False, options={}, every=1)
+    watched.start(folder=tmp_path, settings={}, label=LABEL)
+    for value in (math.nan, 0.4, 0.2):
+        watched._tell({"step": 3, "hard_mape": value, "hard_lpips": None, "patches": 2})
+    watched.finish(failed=False)
+    assert [row["best/hard_mape"] for row in told] == [0.3, 0.3, 0.2]
+    assert told[1] == {"step": 3, "hard/mape": 0.4, "run/patches": 2, "best/hard_mape": 0.3}

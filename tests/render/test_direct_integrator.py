@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from ngi.backend import llvm_problem, mi
+from ngi.machine.backend import llvm_problem, mi
 from ngi.render.mitsuba_renderer import MitsubaRenderer
 from ngi.scene import read_scene, scenes
 

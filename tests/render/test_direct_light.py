@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 import torch
 
-from ngi.backend import llvm_problem
+from ngi.machine.backend import llvm_problem
 from ngi.patches import BufferLayout
 from ngi.render import AnalyticRenderer
 from ngi.render.direct_light import light_points

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from ngi.backend import llvm_problem
+from ngi.machine.backend import llvm_problem
 from ngi.render.mitsuba_renderer import MitsubaRenderer
 from ngi.scene import read_scene
 

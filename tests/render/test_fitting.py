@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from ngi.backend import dr, llvm_problem
+from ngi.machine.backend import dr, llvm_problem
 from ngi.render import jit_tracer
 from ngi.render.fitting import FittingTracer
 from ngi.render.mitsuba_renderer import MitsubaRenderer

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from ngi.backend import dr, mi
+from ngi.machine.backend import dr, mi
 from ngi.render.mitsuba_renderer import MitsubaRenderer
 from ngi.scene import read_scene
 from ngi.scene.variable_scene import VariableScene

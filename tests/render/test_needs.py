@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from ngi.backend import activate, llvm_problem
+from ngi.machine.backend import activate, llvm_problem
 from ngi.patches import BUFFER_CHANNELS
 from ngi.render.materials import collect_materials
 from ngi.render.mitsuba_renderer import MitsubaRenderer

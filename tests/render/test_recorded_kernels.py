@@ -8,7 +8,7 @@ import pytest
 import torch
 from PIL import Image
 
-from ngi.backend import dr, llvm_problem
+from ngi.machine.backend import dr, llvm_problem
 from ngi.render.measure import counted_compilations
 from ngi.render.mitsuba_renderer import MitsubaRenderer
 from ngi.scene import read_scene

@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from ngi.backend import llvm_problem
+from ngi.machine.backend import llvm_problem
 from ngi.render.mitsuba_renderer import MitsubaRenderer
 from ngi.scene import read_scene, scenes
 from ngi.scene.clearance import camera_problems

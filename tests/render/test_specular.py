@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 import torch
 
-from ngi.backend import llvm_problem
+from ngi.machine.backend import llvm_problem
 from ngi.patches import BufferLayout
 from ngi.render import AnalyticRenderer
 from ngi.render.measure import counted_compilations
@@ -219,6 +219,18 @@ def test_thin_glass_passes_straight(load, backend) -> None:
     share = fresnel(-d[..., 2:], INDEX)
     expected = np.broadcast_to(1 - 2 * share / (1 + share), d.shape)
     np.testing.assert_allclose(seen["throughput"], expected, atol=1e-4)
+
+
+def test_a_variable_index_of_thin_glass(load, backend) -> None:
+    pane = GLASS.replace('"dielectric"', '"thindielectric"')
+    shapes = BACK + rectangle("pane", '<scale value="2"/>', pane)
+    variable = "{object: glass, property: eta, minimum: 1.2, maximum: 2.2}"
+    renderer = load(shapes, backend=backend, variables=[variable])
+    d = rays(RESOLUTION)
+    for v in (0.0, 0.3, 1.0):
+        share = fresnel(-d[..., 2:], 1.2 + v)
+        expected = np.broadcast_to(1 - 2 * share / (1 + share), d.shape)
+        np.testing.assert_allclose(buffers(renderer, [v])["throughput"], expected, atol=1e-4)
 
 
 @pytest.mark.parametrize("two_sided", [True, False])

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 import torch
 
-from ngi.backend import dr
+from ngi.machine.backend import dr
 from ngi.render import AnalyticRenderer, workers
 from ngi.render.worker_protocol import RenderServer, WorkerDiedError
 from ngi.render.workers import WorkerRenderer, chunk_sizes

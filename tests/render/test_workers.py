@@ -14,14 +14,15 @@ import pytest
 import torch
 from omegaconf import open_dict
 
-from ngi.backend import llvm_problem
-from ngi.configuration import run_settings
+from ngi.config.configuration import run_settings
+from ngi.machine.backend import llvm_problem
 from ngi.render import watchdog
 from ngi.render.mitsuba_renderer import MitsubaRenderer
 from ngi.render.worker_process import WorkerProcess, visible_gpus
 from ngi.render.worker_protocol import Request
 from ngi.render.workers import WorkerRenderer, mitsuba_renderer
 from ngi.scene import read_scene, scenes
+from tests.config.test_configuration import composed
 from tests.render.odd_renderer import (
     OddRenderer,
     PlaceRenderer,
@@ -31,7 +32,6 @@ from tests.render.odd_renderer import (
     states,
     wait_for,
 )
-from tests.test_configuration import composed
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import torch
 
-from ngi.durable import DamagedError
+from ngi.files.durable import DamagedError
 from ngi.patches import BufferLayout
 from ngi.reuse import PatchArchive, PatchStore
 from ngi.reuse import archive as archive_module

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ngi.backend import mi
+from ngi.machine.backend import mi
 from ngi.scene.release import read_release
 from ngi.scene.variable_scene import VariableScene
 

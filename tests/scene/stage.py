@@ -9,7 +9,7 @@ import yaml
 from PIL import Image
 from scipy import stats
 
-from ngi.backend import activate, mi
+from ngi.machine.backend import activate, mi
 
 SCENES = Path(__file__).parent / "scenes"
 RENDERINGS = 12

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from ngi.backend import activate, llvm_problem, mi
+from ngi.machine.backend import activate, llvm_problem, mi
 from ngi.scene import read_scene, scenes
 from ngi.scene.acceleration import EmbreeScene
 from ngi.scene.variable_scene import VariableScene

@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from ngi.backend import activate, mi
+from ngi.machine.backend import activate, mi
 from ngi.scene import read_scene
 from ngi.scene.arrangement import arranged
 from ngi.scene.kinds import KeyFrames, Material, Shape, Translation, Visibility

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from ngi.backend import activate, mi
+from ngi.machine.backend import activate, mi
 from ngi.scene import read_scene
 from ngi.scene.variable_scene import VariableScene
 from tests.scene.stage import curtain, write_ply
@@ -12,6 +12,13 @@ from tests.scene.stage import curtain, write_ply
 RADIANCE = {"property": "radiance", "minimum": [0, 0, 0], "maximum": [1, 1, 1]}
 ALBEDO = {"property": "albedo", "minimum": [0, 0, 0], "maximum": [1, 1, 1]}
 TURN = {"property": "rotation", "axis": [0, 1, 0], "minimum": 0, "maximum": 9}
+MOVE = {"property": "translation", "minimum": [0, 0, 0], "maximum": [1, 1, 1]}
+AIM = {"property": "direction", "minimum": [0, 10], "maximum": [90, 80]}
+LOOK = {"property": "look_at", "minimum": [0, 1, 4, 0, 1, 0], "maximum": [1, 2, 5, 1, 2, 1]}
+WIDE = {"property": "fov", "minimum": 20, "maximum": 60}
+CONE = {"property": "cone", "minimum": [20, 5], "maximum": [40, 15]}
+HIDE = {"property": "visibility"}
+FIELD = {"scene": "field"}
 TEXELS = {"property": "texels", "minimum": 0, "maximum": 1}
 
 
@@ -36,8 +43,7 @@ def second_instance(root) -> None:
 @pytest.fixture
 def load(make_scene):
     def load_with(entry, *, scene="stage", edit=None, files=None):
-        count = np.prod(entry.get("size", 1))
-        count = 3 if entry["property"] in ("radiance", "albedo") else count
+        count = np.prod(entry.get("size", np.size(entry.get("minimum", 0))))
         folder = make_scene(scene, [entry], dimensions=int(count), edit=edit)
         if files is not None:
             files(folder)
@@ -60,6 +66,10 @@ def linear_image(folder) -> None:
     mi.Bitmap(np.zeros((4, 6, 3), np.float32)).write(str(folder / "linear.exr"))
 
 
+def broken_mesh(folder) -> None:
+    (folder / "curtain_1.ply").write_text("ply\nnonsense\n")
+
+
 def other_mesh(folder) -> None:
     points, triangles, _ = curtain(0.1)
     write_ply(folder / "curtain_1.ply", points, triangles[::-1])
@@ -76,8 +86,27 @@ def other_mesh(folder) -> None:
         ({"object": "ball", **RADIANCE}, "'ball' .* name an emitter", {}),
         ({"object": "picture", **ALBEDO}, "name a BSDF whose reflectance is given as <rgb>", {}),
         ({"object": "paint", **TURN}, "'paint' .* it has no place that could vary", {}),
-        ({"object": "light", "property": "visibility"}, "an emitter cannot be hidden", {}),
-        ({"object": "globe", "property": "visibility"}, "an emitter cannot be hidden", {}),
+        ({"object": "light", **HIDE}, "an emitter cannot be hidden", {}),
+        ({"object": "globe", **HIDE}, "an emitter cannot be hidden", {}),
+        (
+            {"object": "sky", **HIDE},
+            "an emitter cannot be hidden",
+            {"scene": "field"},
+        ),
+        ({"object": "sky", **AIM}, r"'sky' is a EnvironmentMapEmitter; name one of \['Dir", FIELD),
+        ({"object": "lamp", **MOVE}, "'lamp' .* a lamp's is its shape's", {}),
+        (
+            {"object": "ball", **LOOK},
+            r"'ball' is a Sphere; name one of \['PerspectiveCamera'\]",
+            {},
+        ),
+        ({"object": "ball", **WIDE}, "'ball' .*no parameter x_fov.* camera", {}),
+        ({"object": "lamp", **CONE}, "'lamp' .*no parameter cutoff_angle.*name a spot light", {}),
+        (
+            key_frames("curtain", "curtain_0.ply", "curtain_1.ply"),
+            r"/curtain_1\.ply: Mitsuba cannot load it: failed to instantiate",
+            {"files": broken_mesh},
+        ),
         (material("camera", "paint", "blue"), "'camera' has no shape whose material", {}),
         (material("ball", "paint", "board"), "'board' is no BSDF, so 'ball' can't have it", {}),
         (material("ball", "paint", "pain"), "no object has the id 'pain' .* nearest: paint", {}),

@@ -37,6 +37,10 @@ ENTRIES = {
         ["origin_x", "origin_z", "target_x", "target_z"],
     ),
     "direction": ({"minimum": [0, 10], "maximum": [360, 80]}, ["azimuth", "elevation"]),
+    "fov": ({"minimum": 20, "maximum": 60}, [""]),
+    "cone": ({"minimum": [20, 5], "maximum": [40, 15]}, ["cutoff_angle", "beam_width"]),
+    "metallic": ({"minimum": 0.2, "maximum": 0.7}, [""]),
+    "color0": ({"minimum": [0, 0.25, 0.5], "maximum": [1, 0.75, 0.5]}, ["r", "g"]),
 }
 """Entries of the kinds with a minimum and a maximum, and the components that vary."""
 
@@ -175,5 +179,5 @@ def test_component_names() -> None:
 
 def test_every_kind_has_its_own_name() -> None:
     assert all(kind.kind == name for name, kind in KINDS.items())
-    assert len(KINDS) == 16
+    assert len(KINDS) == 33
     assert {"camera"} == KINDS["look_at"].affects == KINDS["camera_path"].affects

@@ -8,7 +8,7 @@ import pytest
 import torch
 from numpy.testing import assert_allclose
 
-from ngi.backend import activate, mi
+from ngi.machine.backend import activate, mi
 from ngi.render.mitsuba_renderer import MitsubaRenderer
 from ngi.scene.release import read_release
 from tests.scene.release_files import Loaded

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from ngi.backend import activate
+from ngi.machine.backend import activate
 from ngi.scene.loading import load
 from tests.scene.release_files import BALL, GROUP, Loaded, read, tags
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from ngi.backend import activate, mi
+from ngi.machine.backend import activate, mi
 from tests.scene.release_files import BALL, ROOM, SENSOR, Loaded, read, tags
 
 LAMP = """<emitter type="area" id="var_lamp"><rgb name="radiance" value="1, 2, 3"/>{}</emitter>
@@ -178,7 +178,8 @@ def test_colour_and_texture_of_a_bsdf(tmp_path) -> None:
 
 
 def test_the_colour_is_a_factor_on_linear_light_where_the_texture_has_8_bits(tmp_path) -> None:
-    image = np.full((4, 4, 3), (188, 188, 188), dtype=np.uint8)  # sRGB 188 is 0.5029 linear
+    image = np.full((4, 4, 3), 188, dtype=np.uint8)
+    linear = ((188 / 255 + 0.055) / 1.055) ** 2.4
     mi.Bitmap(image).write(str(tmp_path / "grey.png"))
     texture = (
         '<texture type="bitmap" name="reflectance"><string name="filename" value="grey.png"/>'
@@ -186,8 +187,23 @@ def test_the_colour_is_a_factor_on_linear_light_where_the_texture_has_8_bits(tmp
     )
     body = WALL.format("diffuse", texture + tags(3, "0, 0, 0", "1, 1, 1"))
     loaded = Loaded(read(tmp_path, body))
-    assert_allclose(albedo(loaded, 1, 0.5, 0), (0.5029, 0.2514, 0), atol=2e-3)
-    assert_allclose(albedo(loaded, 1, 1, 1), (0.5029, 0.5029, 0.5029), atol=2e-3)
+    for colour in [(1, 0.5, 0), (1, 1, 1), (0.01, 0.123, 0.77)]:  # not rounded to 8 bits
+        assert_allclose(albedo(loaded, *colour), linear * np.array(colour), atol=1e-6)
+
+
+def test_a_texture_that_others_refer_to_keeps_its_colour_there(tmp_path) -> None:
+    mi.Bitmap(np.full((4, 4, 3), 0.5, dtype=np.float32)).write(str(tmp_path / "grey.exr"))
+    shared = '<texture type="bitmap" id="grey"><string name="filename" value="grey.exr"/></texture>'
+    reference = '<ref id="grey" name="reflectance"/>'
+    other = (
+        '<shape type="sphere"><transform name="to_world"><translate x="5"/></transform>'
+        f'<bsdf type="diffuse">{reference}</bsdf></shape>'
+    )
+    body = WALL.format("diffuse", reference + tags(3, "0, 0, 0", "1, 1, 1"))
+    loaded = Loaded(read(tmp_path, shared + body + other))
+    assert_allclose(albedo(loaded, 0.2, 0.4, 0.6), (0.1, 0.2, 0.3), atol=1e-6)
+    hit = loaded.scene.ray_intersect(mi.Ray3f(mi.Point3f(5, 0, 9), mi.Vector3f(0, 0, -1)))
+    assert_allclose(np.array(hit.bsdf().eval_diffuse_reflectance(hit)).reshape(3), 0.5, atol=1e-3)
 
 
 def test_camera_looks_into_the_middle_third_at_a_third_of_the_height(tmp_path) -> None:
@@ -229,8 +245,79 @@ def test_a_negative_range_is_warned_of(tmp_path, caplog, body: str, says: str) -
     with caplog.at_level(logging.WARNING):
         read(tmp_path, body + ROOM)
     (message,) = [record.getMessage() for record in caplog.records]
+    text = (tmp_path / "scene.xml").read_text().splitlines()
+    (line,) = [number for number, line in enumerate(text, 1) if "range_bounds" in line]
     place = (
-        rf"{tmp_path}/scene\.xml, line \d+: <(shape|bsdf) type='\w+' id='var_\w+'>: range_bounds"
+        rf"{tmp_path}/scene\.xml, line {line}: <vector(4f)? name='range_bounds' value='[^']*'> in "
+        r"<(shape|bsdf) type='\w+' id='var_\w+'>: a negative number: "
     )
     assert re.match(place, message)
     assert says in message
+
+
+@pytest.mark.parametrize(
+    ("body", "values"),
+    [
+        (WALL.format("diffuse", tags(3, "0.5, 0, 0", "1, 1, 1")), "albedo 0.5, 0, 0 ... 1.5, 1, 1"),
+        (
+            WALL.format("roughconductor", tags(1, "0, 0, 0, 0.5", "0, 0, 0, 0.7", kind="vector4f")),
+            "roughness 0.5 ... 1.2",
+        ),
+    ],
+)
+def test_values_that_a_surface_cannot_have_are_warned_of(tmp_path, caplog, body, values) -> None:
+    with caplog.at_level(logging.WARNING):
+        read(tmp_path, body + ROOM)
+    (message,) = [record.getMessage() for record in caplog.records]
+    assert re.match(
+        rf"{tmp_path}/scene\.xml, line \d+: <bsdf type='\w+' id='var_paint'>: ", message
+    )
+    assert values in message
+
+
+def test_roughness_below_the_smallest_takes_its_component_all_the_same(tmp_path) -> None:
+    values = tags(1, "0, 0, 0, 0.0001", "0, 0, 0, 0.0002", kind="vector4f")
+    loaded = Loaded(read(tmp_path, WALL.format("roughconductor", values)))
+    assert loaded.description.component_names == ("var_paint.roughness",)
+    for u in (0, 1):
+        (alpha,) = [p for k, p in loaded.at(u).items() if ".alpha" in k]
+        assert_allclose(np.array(alpha).reshape(-1), 1e-3, rtol=1e-6)
+
+
+MISPLACED = tags(1, "0, 0, 0", "1, 1, 1")
+STILL = '<shape type="sphere" id="ball">{}</shape>'
+
+
+@pytest.mark.parametrize(
+    ("body", "place"),
+    [
+        (f'<transform name="to_world">{MISPLACED}</transform>', "a tag in <transform name='to_w"),
+        (f'<bsdf type="diffuse"><texture type="bitmap">{MISPLACED}</texture></bsdf>', "in <textu"),
+    ],
+)
+def test_a_tag_in_what_cannot_vary_is_refused(tmp_path, body, place) -> None:
+    moving = f'<shape type="sphere" id="var_ball">{tags(1, "0, 0, 0", "1, 0, 0")}{body}</shape>'
+    line = (
+        r"scene\.xml, line \d+: <integer name='num_parameters' value='1'> in <shape type='sphere'"
+    )
+    with pytest.raises(ValueError, match=line) as error:
+        read(tmp_path, moving)
+    assert place in str(error.value)
+    with pytest.raises(ValueError, match="a tag in <scene>; it belongs directly into one of <sha"):
+        read(tmp_path, SPHERE.format("") + MISPLACED)
+
+
+def test_tags_of_what_does_not_vary_are_warned_of(tmp_path, caplog) -> None:
+    with caplog.at_level(logging.WARNING):
+        description = read(tmp_path, STILL.format(MISPLACED) + LAMP.format(tags(1)))
+    assert description.component_names == ("var_lamp.radiance",)
+    (message,) = [record.getMessage() for record in caplog.records]
+    place = re.escape(f"{tmp_path}/scene.xml, line ") + r"\d+: <shape type='sphere' id='ball'>: "
+    assert re.match(place + "it does not vary, since its id does not begin with 'var_'", message)
+    assert "min_bounds, num_parameters, range_bounds" in message
+
+
+def test_a_tag_given_twice_is_refused(tmp_path) -> None:
+    twice = SPHERE.format(tags(1, "0, 0, 0", "1, 0, 0") + "\n" + tags(2))
+    with pytest.raises(ValueError, match=r"line 12: <integer .*, line 9 has this tag already"):
+        read(tmp_path, twice)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
-from ngi.backend import activate, mi
+from ngi.machine.backend import activate, mi
 from ngi.scene import transforms
 
 points = arrays(np.float64, 3, elements=st.floats(-10, 10, width=32))

@@ -136,7 +136,7 @@ def test_included_files_are_named_from_where_they_lie(kit) -> None:
     names = [name for name, _ in named_files(document)]
     assert names == ["inner/more.xml", "a.png", "a.ply", "inner/mesh.ply"]
     assert read_scene(kit).max_depth == 4, "what includes a file has the say"
-    from ngi.backend import activate
+    from ngi.machine.backend import activate
 
     activate("scalar")
     assert "included" in {shape.id() for shape in load(document).shapes()}

@@ -5,7 +5,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from ngi.backend import activate, mi
+from ngi.machine.backend import activate, mi
 from tests.scene.stage import find, set_value
 from tests.scene.updates import Update, check_update
 

@@ -5,7 +5,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from tests.scene.stage import find, moved, rotate, set_value
+from tests.scene.stage import about, find, moved, rotate, set_value
 from tests.scene.updates import Update, check_update
 
 INTENSITY = {"property": "intensity", "minimum": 0.5, "maximum": 2.5}
@@ -198,7 +198,121 @@ VIEWS = [
 ]
 
 
-UPDATES = [*LIGHTS, *SUN_AND_SKY, *VIEWS]
+POINT = """<emitter type="point" id="bulb"><point name="position" x="0.5" y="1.5" z="0.5"/>
+<rgb name="intensity" value="3, 2, 1"/></emitter>"""
+SPOT = """<emitter type="spot" id="torch"><transform name="to_world">
+<lookat origin="-0.5, 1.5, 1" target="0, 0.5, 0" up="0, 1, 0"/></transform>
+<float name="cutoff_angle" value="30"/><rgb name="intensity" value="5, 9, 9"/></emitter>"""
+BEAMER = """<emitter type="projector" id="beamer"><transform name="to_world">
+<lookat origin="0, 1, 3" target="0, 1, 0" up="0, 1, 0"/></transform><float name="fov" value="20"/>
+<texture type="bitmap" name="irradiance"><string name="filename" value="dots.png"/></texture>
+<float name="scale" value="20"/></emitter>"""
+MOVES = {"property": "translation", "minimum": [-1, -1, 0], "maximum": [1, 1, 0]}
+AIMS = {"property": "direction", "minimum": [-60, 10], "maximum": [60, 70]}
+
+
+def adding(*lights):
+    return lambda root: root.extend(ElementTree.fromstring(light) for light in lights)
+
+
+def aimed(object_id, origin, azimuth, elevation):
+    """The edit that gives a light its place, and the direction that its light comes from."""
+    a, e = np.radians([azimuth, elevation])
+    towards = np.array([np.sin(a) * np.cos(e), np.sin(e), np.cos(a) * np.cos(e)])
+
+    def edit(root) -> None:
+        look_at = find(root, object_id).find("transform/lookat")
+        look_at.set("origin", ", ".join(map(repr, map(float, origin))))
+        look_at.set("target", ", ".join(map(repr, (np.array(origin) - towards).tolist())))
+
+    return edit
+
+
+def with_cone(root) -> None:
+    spot = find(root, "torch")
+    set_value(root, "torch", "cutoff_angle", "25.0")
+    ElementTree.SubElement(spot, "float", name="beam_width", value="12.0")
+
+
+LIGHTS_THAT_MOVE = [
+    Update(
+        "translation of a point light",
+        before=adding(POINT),
+        variables=[{"object": "bulb", **MOVES}],
+        v=[0.25, 0.75],
+        off=[0.25, 0.6],
+        edit=lambda root: find(root, "bulb").find("point").attrib.update(x="0.0", y="2.0"),
+    ),
+    Update(
+        "rotation of a point light about a pivot elsewhere",
+        before=adding(POINT),
+        variables=[
+            {
+                "object": "bulb",
+                "property": "rotation",
+                "axis": [0, 1, 0],
+                "pivot": [0, 0, 0],
+                "minimum": 0,
+                "maximum": 180,
+            }
+        ],
+        v=[0.5],
+        off=[0.6],
+        edit=lambda root: find(root, "bulb").find("point").attrib.update(x="0.5", z="-0.5"),
+    ),
+    Update(
+        "place, direction and cone of a spot",
+        before=adding(SPOT),
+        variables=[
+            {"object": "torch", **MOVES},
+            {"object": "torch", **AIMS},
+            {"object": "torch", "property": "cone", "minimum": [20, 4], "maximum": [30, 20]},
+        ],
+        v=[0.75, 0.25, 0.25, 0.5, 0.5, 0.5],
+        off=[0.75, 0.25, 0.25, 0.5, 0.9, 0.9],
+        edit=lambda root: (aimed("torch", [0, 1, 1], -30, 40)(root), with_cone(root)),
+    ),
+    Update(
+        "rotation of a spot about its own place",
+        before=adding(SPOT),
+        variables=[
+            {
+                "object": "torch",
+                "property": "rotation",
+                "axis": [0, 1, 0],
+                "minimum": -60,
+                "maximum": 60,
+            }
+        ],
+        v=[0.75],
+        off=[0.6],
+        edit=moved("torch", *about([-0.5, 1.5, 1], rotate([0, 1, 0], 30))),
+    ),
+    Update(
+        "place, direction and intensity of a projector",
+        before=adding(BEAMER),
+        variables=[
+            {"object": "beamer", **MOVES},
+            {"object": "beamer", **AIMS},
+            {"object": "beamer", **INTENSITY},
+        ],
+        v=[0.75, 0.75, 0.5, 0.25, 0.75],
+        off=[0.75, 0.75, 0.5, 0.3, 0.75],
+        edit=lambda root: (
+            aimed("beamer", [0.5, 1.5, 3], 0, 25)(root),
+            set_value(root, "beamer", "scale", "40"),
+        ),
+    ),
+    Update(
+        "fov",
+        variables=[{"object": "camera", "property": "fov", "minimum": 20, "maximum": 60}],
+        v=[0.75],
+        off=[0.7],
+        edit=lambda root: set_value(root, "camera", "fov", "50"),
+    ),
+]
+
+UPDATES = [*LIGHTS, *SUN_AND_SKY, *VIEWS, *LIGHTS_THAT_MOVE]
 
 
 @pytest.mark.parametrize("update", UPDATES, ids=lambda update: update.name)

@@ -26,6 +26,18 @@ RIGHT = {
     "look_at": "minimum: [0, 1, 2, 0, 0, 0], maximum: [1, 1, 3, 1, 0, 0]",
     "camera_path": "keys: [[0, 1, 2, 0, 0, 0], [1, 1, 3, 1, 0, 0]]",
     "direction": "minimum: [0, 10], maximum: [360, 80]",
+    "fov": "minimum: 20, maximum: 60",
+    "cone": "minimum: [20, 5], maximum: [40, 15]",
+    "eta": "minimum: 1.2, maximum: 1.8",
+    **dict.fromkeys(("alpha_u", "alpha_v"), "minimum: 0.1, maximum: 0.5"),
+    **dict.fromkeys(("color0", "color1"), "minimum: [0, 0, 0], maximum: [1, 1, 1]"),
+    **dict.fromkeys(
+        (
+            *("metallic", "specular", "spec_tint", "anisotropic", "sheen", "sheen_tint"),
+            *("clearcoat", "clearcoat_gloss", "flatness", "spec_trans"),
+        ),
+        "minimum: 0.2, maximum: 0.7",
+    ),
 }
 OPTIONS = {
     "rotation": "pivot: [1, 2, 3]",
@@ -162,6 +174,18 @@ WRONG = [
     ("camera_path", "keys: [[0, 1, 2, 0, 0, 0], 3]", r"keys\[1\] is 3; expected 6 finite"),
     ("camera_path", f"{RIGHT['camera_path']}, up: [0, 0, 0]", "up is .*give a direction"),
     ("direction", "minimum: [0, -400], maximum: [1, 1]", "minimum is .*direction lies between"),
+    ("fov", "minimum: 0, maximum: 60", r"minimum is \[0.0\]; fov lies between 0.1 and 179"),
+    ("fov", "minimum: 20, maximum: 180", r"maximum is \[180.0\]; fov lies between"),
+    ("cone", "minimum: 20, maximum: 40", "minimum is 20; expected 2 finite"),
+    (
+        "cone",
+        "minimum: [20, 5], maximum: [40, 30]",
+        "beam_width reaches 30, cutoff_angle goes",
+    ),
+    ("cone", "minimum: [20, -5], maximum: [40, 15]", "minimum is .*cone lies between 0.0 and 180"),
+    ("eta", "minimum: 0, maximum: 1.5", r"minimum is \[0.0\]; eta lies between 0.2 and 5"),
+    ("metallic", "minimum: 0, maximum: 1.5", r"maximum is \[1.5\]; metallic lies between 0.0 and"),
+    ("color0", "minimum: 0, maximum: 1", "minimum is 0; expected 3 finite"),
 ]
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ngi.backend import activate, llvm_problem, mi
+from ngi.machine.backend import activate, llvm_problem, mi
 from ngi.scene import read_scene
 from ngi.scene.variable_scene import VariableScene
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ngi.backend import activate, mi
+from ngi.machine.backend import activate, mi
 from ngi.scene import read_scene
 from ngi.scene.variable_scene import VariableScene
 from tests.scene.stage import disagreement, pictures

@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,16 +12,19 @@ import numpy as np
 import pytest
 import torch
 
-from ngi.models import PixelGenerator
+from ngi.files.resources import root
+from ngi.models import EncodedGenerator, PixelGenerator
+from ngi.models.known_light import add_known_light
 from ngi.patches import BUFFER_CHANNELS, CHAIN_CHANNELS, DIRECT_CHANNELS, BufferLayout
 from ngi.scene import read_scene, scenes
 from ngi.view import export
 from ngi.view.network_file import largest_difference, network_file
-from ngi.view.network_metadata import BUFFERS, scene_metadata
+from ngi.view.network_metadata import BUFFERS, KNOWN_LIGHT, known_light, scene_metadata
 from ngi.view.trained_run import TrainedRun
 from tests.learn.command_line import run
 
 onnx = pytest.importorskip("onnx", reason="the extra 'export' is missing")
+onnxruntime = pytest.importorskip("onnxruntime", reason="the extra 'export' is missing")
 
 EMBEDDER = """
 import json, sys
@@ -118,15 +122,66 @@ def test_the_file_says_what_its_inputs_are(
     assert BUFFERS.keys() == BUFFER_CHANNELS.keys() | CHAIN_CHANNELS.keys() | DIRECT_CHANNELS.keys()
 
 
-def test_a_network_that_adds_direct_light_gives_the_same_numbers() -> None:
-    layout = BufferLayout(("position", "direct", "emission"))
+OURS = partial(EncodedGenerator, octaves=3, directions=True)
+
+
+@pytest.mark.parametrize(("make", "dimensions"), [(PixelGenerator, 2), (OURS, 2), (OURS, 0)])
+def test_a_network_that_adds_direct_light_gives_the_same_numbers(make, dimensions: int) -> None:
+    layout = BufferLayout(("position", "normal", "outgoing", "direct", "emission"))
     with torch.random.fork_rng():
         torch.manual_seed(0)
-        network = PixelGenerator(
-            layout=layout, scene_dimensions=2, hidden_features=8, hidden_layers=2
+        network = make(
+            layout=layout, scene_dimensions=dimensions, hidden_features=8, hidden_layers=2
         )
-        buffers, v = 2 * torch.rand(20, layout.channels), torch.rand(2)
-    assert largest_difference(network_file(network, {}), network, buffers, v) < 1e-5
+        buffers, v = 2 * torch.rand(20, layout.channels), torch.rand(dimensions)
+    content = network_file(network, {})
+    assert largest_difference(content, network, buffers, v) < 1e-5
+    session = onnxruntime.InferenceSession(content, providers=["CPUExecutionProvider"])
+    [found] = session.run(None, {"buffers": buffers.numpy(), "v": v.numpy()})
+    with torch.no_grad():
+        exact = network.double()(buffers.double()[None, None], v.double()[None])[0, 0]
+    np.testing.assert_allclose(found, exact.exp() - 1, rtol=1e-5, atol=1e-5)
+
+
+@pytest.mark.parametrize("names", KNOWN_LIGHT)
+def test_known_light_is_added_as_the_file_says(names: tuple[str, ...]) -> None:
+    layout = BufferLayout(("position", *names))
+    output, buffers = torch.rand(50, 3), 2 * torch.rand(50, layout.channels)
+    channels = {name: buffers[:, layout.slice(name)].numpy() for name in names}
+    told, _, rest = known_light(layout).partition("; ")
+    assert "nothing is to be added" in rest
+    emitter, _, formula = told.rpartition("elsewhere ")
+    known = {"expm1": np.expm1, "log1p": np.log1p, "o": output.numpy(), **channels}
+    expected = eval(formula, known)
+    if "emission" in names:
+        assert emitter == "expm1(emission) in channels where emission > 1, "
+        bright = channels["emission"] > 1
+        expected = np.where(bright, np.expm1(channels["emission"]), expected)
+    found = add_known_light(output, buffers, layout).expm1()
+    np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-6)
+
+
+def test_a_network_of_ours_says_what_of_v_it_is_given_and_how_it_is_shown(tmp_path: Path) -> None:
+    folder = root() / "scenes" / "living-room" / "network"
+    assert export.main([f"run={folder}", f"out={tmp_path / 'network.onnx'}"]) == 0
+    session = onnxruntime.InferenceSession(tmp_path / "network.onnx")
+    told = session.get_modelmeta().custom_metadata_map
+    run = TrainedRun.open(folder)
+    assert run.description is not None
+    names, camera = run.description.component_names, run.description.camera_part
+    assert json.loads(told["left_out"]) == [*names[camera]] != []
+    given = [name for entry in json.loads(told["variables"]) for name in entry["components"]]
+    assert given == [name for name in names if name not in names[camera]]
+    assert told["buffer_samples"] == str(run.renderer.buffer_samples)
+    v = run.renderer.hard_frames()[0]
+    buffers = run.renderer.image_buffers(v, resolution=96)
+    kept = torch.stack([u for name, u in zip(names, v, strict=True) if name in given])
+    inputs = {"buffers": buffers.flatten(0, 1).numpy(), "v": kept.numpy()}
+    [radiance] = session.run(None, inputs)
+    shown = run.radiance(v, resolution=96).flatten(0, 1).numpy()
+    difference = (np.abs(radiance - shown) / (1 + np.abs(radiance))).max()
+    stated = float(told["precision"].split("up to ")[1].split()[0])
+    assert 0 < difference == pytest.approx(stated, rel=0.06)  # it is told with two digits
 
 
 def test_it_tells_no_path_of_this_machine(exported: Path) -> None:
@@ -167,7 +222,7 @@ def ranged(entry: dict[str, Any], u: Iterator[float]) -> list[float]:
 @pytest.mark.parametrize("scene", ["sphere-caustic", "living-room", "veach-door", "chess"])
 def test_the_variables_can_be_set_by_what_it_says(scene: str) -> None:
     description = read_scene(**scenes()[scene])
-    told = scene_metadata(description)
+    told = scene_metadata(description, range(description.dimensions))
     variables = json.loads(told["variables"])
     assert [name for entry in variables for name in entry["components"]] == [
         *description.component_names

@@ -117,13 +117,11 @@ def test_the_clock_stands_still_and_half_of_the_time_is_training(
     monkeypatch.setattr(live, "TrainingPanel", lambda *_: SimpleNamespace(show=lambda **_: None))
     monkeypatch.setattr(LiveView, "_refresh", lambda _: None)
     recorded, clock = Recorded(visitors=visitors), PhaseClock()
+    of_run: Any = SimpleNamespace(stream=recorded, clock=clock)
     view = LiveView(
+        of_run,
         page=recorded,  # type: ignore[arg-type]
         studio=recorded,  # type: ignore[arg-type]
-        samples=recorded,  # type: ignore[arg-type]
-        stream=recorded,  # type: ignore[arg-type]
-        folder=recorded,  # type: ignore[arg-type]
-        clock=clock,
         variables=["x"],
     )
     clock.start()

@@ -1,9 +1,12 @@
 """`python -m ngi.render` on runs of closed formulas, as a user starts it."""
 
+import contextlib
+import io
 import json
 import shutil
 import subprocess
 import sys
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +15,24 @@ import torch
 from PIL import Image
 
 from ngi.render.exr import write_exr
+from ngi.view.picture import main
 from tests.learn.command_line import environment, run
 
 RUN = "run.folder=run"
 
 
 def render(folder: Path, *options: str) -> tuple[int, str]:
+    """Exit status and everything printed; in this process, which spares its imports."""
+    printed = io.StringIO()
+    with contextlib.chdir(folder), redirect_stdout(printed), redirect_stderr(printed):
+        try:
+            status = main(["run=run", *options])
+        except SystemExit as ended:
+            status = int(ended.code or 0)
+    return status, printed.getvalue()
+
+
+def render_as_users_do(folder: Path, *options: str) -> tuple[int, str]:
     done = subprocess.run(
         [sys.executable, "-m", "ngi.render", "run=run", *options],
         capture_output=True,
@@ -38,7 +53,7 @@ def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_picture_is_the_one_that_training_wrote(trained: Path) -> None:
-    status, output = render(trained, "hard_frame=3", "resolution=48", "out=three.png")
+    status, output = render_as_users_do(trained, "hard_frame=3", "resolution=48", "out=three.png")
     assert status == 0, output
     assert "step 12" in output
     expected = Image.open(trained / "run" / "pictures" / "hard_03_prediction.png")
@@ -66,7 +81,7 @@ def test_v_may_be_given(trained: Path) -> None:
 
 
 def test_exr_files_hold_linear_radiance(tmp_path: Path) -> None:
-    from ngi.backend import mi
+    from ngi.machine.backend import mi
 
     radiance = torch.rand(5, 7, 3, generator=torch.Generator().manual_seed(0)) * 100 - 1
     write_exr(tmp_path / "a.exr", radiance)
@@ -83,7 +98,9 @@ def test_exr_files_hold_linear_radiance(tmp_path: Path) -> None:
         (("out=picture.jpg",), ".png"),
         (("out=nowhere/picture.png",), "no folder nowhere"),
         (("resolution=0",), "at least 1"),
-        (("resolution=many",), "resolution: "),
+        (("resolution=many",), "'resolution=many' is wrong: resolution is an integer"),
+        (("reference=64:",), "'reference=64:' is wrong: reference is an integer"),
+        (("v=[0.5,",), "'v=[0.5,' is wrong: v is a list of numbers"),
         (("colour=red",), "'colour' is no option"),
     ],
 )
@@ -140,7 +157,7 @@ def test_a_scene_that_changed_or_is_unknown_is_refused(trained: Path, tmp_path: 
         ("model", "os.system"),
         ("model", "ngi.train.os.system"),
         ("renderer", "subprocess.check_output"),
-        ("renderer", "ngi.durable.write_atomically"),
+        ("renderer", "ngi.files.durable.write_atomically"),
     ],
 )
 def test_a_folder_of_somebody_else_executes_nothing(

@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
-from ngi.configuration import scene_place
+from ngi.config.configuration import scene_place
+from ngi.files.resources import root
 from ngi.learn import RunFolder
-from ngi.resources import root
-from ngi.view.run_settings import describe_scene
-from tests.test_configuration import composed
+from ngi.view.run_settings import RENAMED, describe_scene, made_by
+from tests.config.test_configuration import composed
 
 SETTINGS: dict[str, Any] = {
     "scene": {"name": "my-lamp", "hash": "0"},
@@ -70,3 +70,9 @@ def test_a_scene_of_the_authors_is_found_by_its_absolute_path(tmp_path, monkeypa
         "_target_": "ngi.scene.release.read_release",
         "path": str(tmp_path / "theirs"),
     }
+
+
+@pytest.mark.parametrize("old", RENAMED)
+def test_what_an_older_run_names_is_found_where_it_is_now(old: str) -> None:
+    group = "model" if ".models." in old else "data"
+    assert made_by({group: {"_target_": old}}, group).__name__ == old.rpartition(".")[2]

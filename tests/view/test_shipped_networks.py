@@ -5,7 +5,7 @@ import json
 import pytest
 import torch
 
-from ngi.resources import root
+from ngi.files.resources import root
 from ngi.view.trained_run import TrainedRun
 
 FOLDERS = sorted((root() / "scenes").glob("*/network"))

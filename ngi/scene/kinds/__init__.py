@@ -12,6 +12,7 @@ from ngi.scene.kinds.appearance import (
     Texture,
     most_materials,
 )
+from ngi.scene.kinds.numbers import NUMBERS, FieldOfView
 from ngi.scene.kinds.placement import KeyFrames, Rotation, Scale, Shape, Translation, Visibility
 from ngi.scene.kinds.view import CameraPath, Direction, LookAt
 from ngi.scene.variable import Variable
@@ -21,6 +22,7 @@ __all__ = [
     "Albedo",
     "CameraPath",
     "Direction",
+    "FieldOfView",
     "Intensity",
     "KeyFrames",
     "LookAt",
@@ -37,24 +39,23 @@ __all__ = [
     "most_materials",
 ]
 
-KINDS: dict[str, type[Variable]] = {
-    kind.kind: kind
-    for kind in (
-        Albedo,
-        Roughness,
-        Texture,
-        Texels,
-        Material,
-        Intensity,
-        Radiance,
-        Translation,
-        Rotation,
-        Scale,
-        Visibility,
-        Shape,
-        KeyFrames,
-        LookAt,
-        CameraPath,
-        Direction,
-    )
-}
+_ALL: tuple[type[Variable], ...] = (
+    Albedo,
+    Roughness,
+    Texture,
+    Texels,
+    Material,
+    Intensity,
+    Radiance,
+    Translation,
+    Rotation,
+    Scale,
+    Visibility,
+    Shape,
+    KeyFrames,
+    LookAt,
+    CameraPath,
+    Direction,
+    *NUMBERS,
+)
+KINDS = {kind.kind: kind for kind in _ALL}

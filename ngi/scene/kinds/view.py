@@ -15,6 +15,10 @@ from ngi.scene.yaml_keys import Vector, YamlKeys
 VIEW = ("origin_x", "origin_y", "origin_z", "target_x", "target_y", "target_z")
 UP = (0.0, 1.0, 0.0)
 
+CAMERAS = ("PerspectiveCamera",)
+DIRECTED = ("DirectionalEmitter", "SpotLight", "Projector")
+"""Classes of Mitsuba's."""
+
 
 @dataclass(frozen=True)
 class LookAt(RangedVariable):
@@ -30,7 +34,7 @@ class LookAt(RangedVariable):
     numbers = VIEW
 
     def bind_one(self, scene: LoadedScene, object_id: str) -> Write:
-        placement = scene.placement(object_id)
+        placement = scene.placement(object_id, only=CAMERAS)
         return lambda view: placement.place(
             transforms.look_at(view[:3], view[3:], np.array(self.up))
         )
@@ -75,7 +79,7 @@ class CameraPath(Variable):
 
     def bind(self, scene: LoadedScene) -> Write:
         (object_id,) = self.objects
-        placement = scene.placement(object_id)
+        placement = scene.placement(object_id, only=CAMERAS)
         return lambda view: placement.place(
             transforms.look_at(view[:3], view[3:], np.array(self.up))
         )
@@ -92,9 +96,10 @@ class CameraPath(Variable):
 
 @dataclass(frozen=True)
 class Direction(RangedVariable):
-    """Where the light of a directional emitter comes from, in degrees, with y up.
+    """Where the light of a sun, a spot or a projector comes from, in degrees, with y up.
 
-    azimuth: 0 is +z and 90 is +x. elevation: 0 is the horizon and 90 the zenith.
+    azimuth: 0 is +z and 90 is +x. elevation: 0 is the horizon and 90 the zenith. A spot or
+    projector stays where it is.
     """
 
     kind = "direction"
@@ -102,7 +107,8 @@ class Direction(RangedVariable):
     limits = (-360.0, 360.0)
 
     def bind_one(self, scene: LoadedScene, object_id: str) -> Write:
-        placement = scene.placement(object_id)
+        placement = scene.placement(object_id, only=DIRECTED)
+        place = transforms.translation(placement.origin)
 
         def write(angles: Values) -> None:
             azimuth, elevation = np.radians(angles)
@@ -113,6 +119,6 @@ class Direction(RangedVariable):
                     np.cos(azimuth) * np.cos(elevation),
                 ]
             )
-            placement.place(transforms.look_at(np.zeros(3), -towards, np.array(UP)))
+            placement.place(place @ transforms.look_at(np.zeros(3), -towards, np.array(UP)))
 
         return write

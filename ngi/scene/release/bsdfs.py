@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from logging import getLogger
+from math import inf, nextafter
 from xml.etree.ElementTree import Element, SubElement
 
 from ngi.scene.kinds import Albedo, Material, Roughness
 from ngi.scene.release.kinds import Tint
 from ngi.scene.release.objects import Objects
-from ngi.scene.release.source import shown
 from ngi.scene.release.tags import Tags, is_variable
 from ngi.scene.variable import Variable
-
-_logger = getLogger(__name__)
 
 _COLOURS = {
     "diffuse": "reflectance",
@@ -76,6 +73,9 @@ def _colour(objects: Objects, bsdf: Element, tags: Tags) -> Variable:
         for texture in (texture for textures in textured for texture in textures):
             if texture is None or texture.get("type") != "bitmap":
                 raise objects.source.error(bsdf, "its colour can only be a factor on bitmaps")
+        for inner, elements in zip(inners, given, strict=True):
+            for element in elements:
+                _make_floating(_own(objects, inner, element))
         return Tint(ids, low, high)
     for inner, elements in zip(inners, given, strict=True):
         if [element.tag for element in elements] != ["rgb"]:
@@ -91,6 +91,7 @@ def _roughness(bsdf: Element, inner: Element, tags: Tags) -> Variable:
     """Alpha, at least the smallest that is rough at all."""
     (low,), (high,) = tags.ends(slice(3, 4))
     low, high = (max(alpha, Roughness.limits[0]) for alpha in (low, high))
+    high = nextafter(low, inf) if high == low else high  # it takes a component all the same
     name = _ROUGHNESS[inner.attrib["type"]]
     names = (name, f"{name}_u", f"{name}_v")
     given = [child for child in inner if child.get("name") in names]
@@ -110,10 +111,8 @@ def _choice(objects: Objects, bsdf: Element) -> Material:
     name = objects.id_of(outer, like=f"{bsdf.attrib['id']}_side")
     textures = _reflectances(_inner(bsdf))
     if len(textures) < 2:
-        _logger.warning(
-            "%s: %s: it has no textures to choose from; a component of v changes nothing",
-            objects.source.document.path,
-            shown(bsdf),
+        objects.source.warn(
+            bsdf, "it has no textures to choose from; a component of v changes nothing"
         )
     copies = [objects.copy(outer) for _ in textures[1:]]
     for index, one in enumerate([outer, *copies]):
@@ -142,6 +141,23 @@ def _inner(bsdf: Element) -> Element:
 def _reflectances(bsdf: Element) -> list[Element]:
     name = _COLOURS.get(bsdf.get("type", ""))
     return [child for child in bsdf if child.get("name") == name]
+
+
+def _own(objects: Objects, inner: Element, element: Element) -> Element:
+    """The texture of a BSDF; one that it only refers to is copied, since others keep theirs."""
+    if element.tag != "ref":
+        return element
+    own = objects.copy(objects.by_id(element.get("id", "")))
+    own.set("name", element.get("name", ""))
+    inner[list(inner).index(element)] = own
+    return own
+
+
+def _make_floating(bitmap: Element) -> None:
+    """Has Mitsuba keep linear floating-point numbers, whatever the file holds."""
+    for child in bitmap.findall("string[@name='format']"):
+        bitmap.remove(child)
+    SubElement(bitmap, "string", {"name": "format", "value": "variant"})
 
 
 def _texture(objects: Objects, element: Element) -> Element | None:

@@ -14,7 +14,10 @@ NOTHING = "nothing"
 
 @dataclass(frozen=True)
 class Tint(RangedVariable):
-    """Factor on the bitmap that is the reflectance of a BSDF, linear RGB."""
+    """Factor on the bitmap that is the reflectance of a BSDF, linear RGB.
+
+    The bitmap is kept in floating point: to encode 8 bits anew took longer than to trace a patch.
+    """
 
     kind = "tint"
     affects = frozenset({"albedo"})
@@ -30,8 +33,8 @@ class Tint(RangedVariable):
         bitmap = scene.bitmap(key)
         if bitmap.shape[2] != 3:
             raise ValueError(f"'{object_id}': a bitmap of grey values cannot be tinted")
-        authored = bitmap.linear(scene.read(key))
-        return lambda colour: scene.write(key, bitmap.stored(authored * colour))
+        authored = scene.read(key).astype(np.float32)
+        return lambda colour: scene.write(key, np.multiply(authored, colour, dtype=np.float32))
 
 
 @dataclass(frozen=True)

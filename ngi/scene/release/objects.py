@@ -53,8 +53,9 @@ class Objects:
         return element.attrib["id"]
 
     def copy(self, element: Element) -> Element:
-        """A copy of an element, whose ids and those in it are new ones."""
+        """A copy of an element, in the same lines, whose ids and those in it are new ones."""
         new = copy.deepcopy(element)
+        self.source.note_copy(element, new)
         for child in new.iter():
             if child.tag != "ref" and "id" in child.attrib:
                 old = child.attrib["id"]

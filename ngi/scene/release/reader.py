@@ -24,9 +24,9 @@ from ngi.scene.release.source import Source, read_source
 from ngi.scene.release.tags import Tags, class_of, take_tags
 from ngi.scene.release.variables import emitter_variable, sensor_variable
 from ngi.scene.scene_files import SceneFile, content_hash, integrator_max_depth, named_files
-from ngi.scene.variable import Variable
+from ngi.scene.variable import RangedVariable, Variable
 
-RULES_VERSION = 1
+RULES_VERSION = 2
 """Counts changes of how the tags are read: references of a scene read otherwise are not reused."""
 
 
@@ -98,11 +98,24 @@ def _rewrite(
         variables += motion.variables(objects.ids(name))
     variables += choices
     for element, element_tags in tags.items():
+        made: list[Variable] = []
         match class_of(element):
             case "emitter":
-                variables.append(emitter_variable(objects, element, element_tags))
+                made = [emitter_variable(objects, element, element_tags)]
             case "bsdf":
-                variables += bsdf_variables(objects, element, element_tags)
+                made = bsdf_variables(objects, element, element_tags)
             case "sensor":
-                variables.append(sensor_variable(objects, element, element_tags, still))
+                made = [sensor_variable(objects, element, element_tags, still)]
+        for variable in made:
+            _warn_of_values(source, element, variable)
+        variables += made
     return tuple(variables)
+
+
+def _warn_of_values(source: Source, element: Element, variable: Variable) -> None:
+    """Of an albedo above 1, for example: the file is read as it is."""
+    if not isinstance(variable, RangedVariable):
+        return
+    low, high = variable.limits
+    if not all(low <= value <= high for value in (*variable.minimum, *variable.maximum)):
+        source.warn(element, f"{variable.kind} {variable.range}, out of {low:g} to {high:g}")

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from logging import getLogger
 from xml.etree.ElementTree import Element, SubElement
 
 from ngi.scene.release.source import Source
-
-_logger = getLogger(__name__)
 
 DEFAULT_SAMPLES = 4
 DEFAULT_FILM = {"width": 768, "height": 576}
@@ -35,7 +32,7 @@ def rewrite_integrator(source: Source) -> None:
         if name == "samples_per_pass":
             integrator.remove(child)
         elif name == "hide_emitters" and value == "true":
-            _logger.warning("%s: hide_emitters is true; they are shown", source.document.path)
+            source.warn(child, "they are shown all the same")
             child.set("value", "false")
         elif name == "max_depth":
             source.integer(child)
@@ -52,12 +49,10 @@ def rewrite_sensor(source: Source) -> int:
     size = {name: _size(source, film, name) for name in ("width", "height")}
     width, height = (source.integer(element) for element in size.values())
     if width != height:
-        _logger.warning(
-            "%s: the film is %d x %d pixels; it becomes square, with the field of view of %s",
-            source.document.path,
-            width,
-            height,
-            "its height" if _fov_axis(sensor) == "y" else "its width",
+        kept = "its height" if _fov_axis(sensor) == "y" else "its width"
+        source.warn(
+            film,
+            f"{width} x {height} pixels; it becomes square, with the field of view of {kept}",
         )
         size["height"].set("value", str(width))
     samples = sensor.find("sampler/integer[@name='sample_count']")

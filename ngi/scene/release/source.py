@@ -4,33 +4,50 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from logging import getLogger
 from math import isfinite
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from ngi.scene.scene_files import SceneFile, check_files, element_places
-from ngi.scene.xml_file import Lines, read_xml, shown
+from ngi.scene.xml_file import Lines, named, parents_in, read_xml
 from ngi.scene.yaml_keys import Vector
+
+_logger = getLogger(__name__)
 
 
 @dataclass(frozen=True)
 class Source:
-    """A parsed file; `document` is what becomes of it, `lines` where each element begins."""
+    """A parsed file; `document` is what becomes of it.
+
+    lines: where each element begins. parents: what each stood in, in the file.
+    """
 
     document: SceneFile
     lines: Lines
+    parents: dict[Element, Element]
 
     @property
     def root(self) -> Element:
         return self.document.root
 
     def place(self, element: Element) -> str:
-        """File and line."""
-        return f"{self.document.path}, line {self.lines.get(element, '?')}"
+        """File and line; the file alone for an element that was added."""
+        return self.document.places.get(element, str(self.document.path))
+
+    def note_copy(self, element: Element, new: Element) -> None:
+        """Says that an element and all in it have the lines of those that they were copied from."""
+        places = self.document.places
+        pairs = zip(element.iter(), new.iter(), strict=True)
+        places.update({copied: places[old] for old, copied in pairs if old in places})
 
     def error(self, element: Element, message: str) -> ValueError:
         """A ValueError that names the file, the line and the element."""
-        return ValueError(f"{self.place(element)}: {shown(element)}: {message}")
+        return ValueError(f"{self.place(element)}: {named(element, self.parents)}: {message}")
+
+    def warn(self, element: Element, message: str) -> None:
+        """Says something that names the file, the line and the element."""
+        _logger.warning("%s: %s: %s", self.place(element), named(element, self.parents), message)
 
     def numbers(self, element: Element, attribute: str = "value") -> Vector:
         """The numbers of an attribute, with commas or spaces between them."""
@@ -74,7 +91,8 @@ def read_source(path: Path) -> Source:
     if not path.is_file():
         raise FileNotFoundError(f"{path}: no such scene file; scene.path names its folder or it")
     root, lines = read_xml(path)
-    source = Source(SceneFile(path, root, places=element_places(path, lines)), lines)
+    document = SceneFile(path, root, places=element_places(path, lines))
+    source = Source(document, lines, parents_in(root))
     _check(source)
     return source
 

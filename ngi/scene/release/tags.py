@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from difflib import get_close_matches
-from logging import getLogger
 from math import inf, nextafter
 from xml.etree.ElementTree import Element
 
-from ngi.scene.release.source import Source, shown
+from ngi.scene.release.source import Source
+from ngi.scene.xml_file import shown
 from ngi.scene.yaml_keys import Vector
-
-_logger = getLogger(__name__)
 
 NAMES = (
     "num_parameters",
@@ -69,17 +67,22 @@ def take_tags(source: Source) -> dict[Element, Tags]:
     """The tags of every variable element, class by class and within one as in the file.
 
     All tags are taken out of the document. Those of elements whose id does not begin with 'var_'
-    mean nothing.
+    mean nothing. Raises ValueError for tags in what cannot vary.
     """
     found: dict[Element, Tags] = {}
     for element in list(source.root.iter()):
         if is_variable(element):
             _check(source, element)
             found[element] = _tags(source, element)
-        elif taken := _take(element):
-            names = ", ".join(sorted(taken))
-            _logger.info(
-                "%s: %s: not variable, %s ignored", source.document.path, shown(element), names
+        elif taken := _take(source, element):
+            if class_of(element) not in CLASSES:
+                tag = next(iter(taken.values()))
+                message = f"a tag in {shown(element)}; it belongs directly into {_varying()}"
+                raise source.error(tag, message)
+            source.warn(
+                element,
+                "it does not vary, since its id does not begin with 'var_'; ignored: "
+                + ", ".join(sorted(taken)),
             )
     for element in source.root.iter("vector4f"):
         raise source.error(element, f"only tags are of this type: {', '.join(NAMES)}")
@@ -87,15 +90,17 @@ def take_tags(source: Source) -> dict[Element, Tags]:
     return dict(sorted(found.items(), key=lambda entry: CLASSES.index(class_of(entry[0]))))
 
 
-def _take(element: Element) -> dict[str, Element]:
-    tags = {name: child for child in element if (name := child.get("name", "")) in NAMES}
+def _take(source: Source, element: Element) -> dict[str, Element]:
+    tags: dict[str, Element] = {}
     for child in [child for child in element if child.get("name") in NAMES]:
+        if (first := tags.setdefault(child.attrib["name"], child)) is not child:
+            raise source.error(child, f"{source.place(first)} has this tag already; take one out")
         element.remove(child)
     return tags
 
 
 def _tags(source: Source, element: Element) -> Tags:
-    taken = _take(element)
+    taken = _take(source, element)
 
     def number(name: str, default: float) -> float:
         return source.number(taken[name]) if name in taken else default
@@ -127,13 +132,9 @@ def _warn_of_negative(source: Source, element: Element, tag: Element) -> None:
         meaning = "a shape does not move along that axis, and a component too many turns it"
     else:
         meaning = "the value falls from min_bounds, where v is 0, to the smaller one, where v is 1"
-    _logger.warning(
-        "%s: %s: range_bounds is '%s', with a negative number: %s; write minimum and positive "
-        "range where that is not meant",
-        source.place(tag),
-        shown(element),
-        tag.get("value", ""),
-        meaning,
+    source.warn(
+        tag,
+        f"a negative number: {meaning}; write minimum and positive range where that is not meant",
     )
 
 
@@ -148,8 +149,7 @@ def _bounds(source: Source, element: Element | None, default: float) -> Vector:
 def _check(source: Source, element: Element) -> None:
     """Finds tags that are none, such as 'max_bounds', and elements that cannot vary."""
     if class_of(element) not in CLASSES:
-        known = ", ".join(f"<{name}>" for name in CLASSES if name != "shapegroup")
-        raise source.error(element, f"an id that begins with 'var_' belongs to one of {known}")
+        raise source.error(element, f"an id that begins with 'var_' belongs to {_varying()}")
     for child in element:
         name = child.get("name", "")
         alike = name.startswith(("num_", "min_", "max_", "range_")) or name.endswith("_bounds")
@@ -157,6 +157,11 @@ def _check(source: Source, element: Element) -> None:
             near = get_close_matches(name, NAMES, n=1, cutoff=0)[0]
             known = ", ".join(NAMES)
             raise source.error(child, f"no tag (did you mean '{near}'?); known: {known}")
+
+
+def _varying() -> str:
+    """What can vary, for people."""
+    return "one of " + ", ".join(f"<{name}>" for name in CLASSES if name != "shapegroup")
 
 
 def _check_places(source: Source, found: dict[Element, Tags]) -> None:

@@ -1,0 +1,140 @@
+"""What a choice of patches could gain: `python -m analysis.ceiling FOLDER`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Hashable, Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from analysis.statistics import Estimate, paired_difference
+from analysis.tables import MISSING, Cell, Table, to_markdown
+
+BASELINE = "uniform"
+
+ERRORS = {
+    "hard_error": "hard frames",
+    "uniform_error": "uniform frames",
+    "hard_tail": "worst 5 % of pixels, hard frames",
+}
+"""Columns of a run: geometric means of the four metrics, and a tail of log1p radiance."""
+
+NO_CHOICE = "all patches"
+"""Uniform choice of the whole pool: what no unbiased choice of fewer patches can go beyond."""
+
+EVERYWHERE = "all of them"
+"""The scenes together: every scene's every seed is one pair."""
+
+
+def read_runs(folder: Path) -> pd.DataFrame:
+    """A row per finished run of `python -m ngi.studies.ceiling` below `folder`.
+
+    Raises ValueError where there is none.
+    """
+    files = sorted(folder.rglob("runs/*.csv"))
+    if not files:
+        raise ValueError(f"{folder}: no runs of `python -m ngi.studies.ceiling` in it")
+    return pd.concat([pd.read_csv(file) for file in files], ignore_index=True)
+
+
+def differences(runs: pd.DataFrame) -> pd.DataFrame:
+    """A row per scene, number of steps and patches, choice and error.
+
+    Columns: these, uniform (mean error of uniform choice), difference (relative, of the choice to
+    uniform choice, mean over the seeds that both have), half_width (of its 95 % interval, NaN for
+    one seed) and seeds. Where there are several scenes, `EVERYWHERE` stands for all. Runs on as
+    many patches as only uniform choice was made of, which is all of the pool, are the choice
+    `NO_CHOICE` for every other number.
+    """
+    rows = []
+    runs = runs.assign(pair=runs.groupby(["scene", "seed"]).ngroup())
+    everywhere = runs.assign(scene=EVERYWHERE)
+    both = pd.concat([runs, everywhere]) if runs["scene"].nunique() > 1 else runs
+    for (scene, steps), of_steps in both.groupby(["scene", "steps"], sort=False):
+        compared = set(of_steps.loc[of_steps["choice"] != BASELINE, "patches"])
+        everything = of_steps[~of_steps["patches"].isin(compared)].assign(choice=NO_CHOICE)
+        for patches in sorted(compared):
+            here = pd.concat([of_steps[of_steps["patches"] == patches], everything])
+            for choice in [c for c in here["choice"].unique() if c != BASELINE]:
+                for error in ERRORS:
+                    uniform = _by_pair(here, BASELINE, error)
+                    found = paired_difference(uniform, _by_pair(here, choice, error))
+                    if found is None:
+                        continue
+                    rows.append(
+                        {
+                            "scene": scene,
+                            "steps": steps,
+                            "patches": patches,
+                            "choice": choice,
+                            "error": error,
+                            "uniform": sum(uniform.values()) / len(uniform),
+                            "difference": found.mean,
+                            "half_width": found.half_width,
+                            "seeds": found.n,
+                        }
+                    )
+    return pd.DataFrame(rows)
+
+
+def table(found: pd.DataFrame, error: str) -> Table:
+    """Differences to uniform choice in one error, a row per scene, steps and patches."""
+    shown = found[found["error"] == error]
+    choices = sorted(shown["choice"].unique(), key=lambda name: (name == NO_CHOICE, name))
+    rows = []
+    groups = shown.groupby(["scene", "steps", "patches"], sort=False)
+    for (scene, steps, patches), group in groups:
+        by_choice = {row["choice"]: row for row in group.to_dict("records")}
+        cells = [_text(by_choice.get(choice)) for choice in choices]
+        labels = (scene, f"{steps}", f"{patches}", f"{group['uniform'].iloc[0]:.4f}")
+        rows.append(tuple(Cell(str(text)) for text in (*labels, *cells)))
+    columns = ("scene", "steps", "patches", "uniform choice", *choices)
+    return Table(f"Error on {ERRORS[error]}, against uniform choice", columns, tuple(rows), 1)
+
+
+def _by_pair(runs: pd.DataFrame, choice: str, error: str) -> dict[int, float]:
+    chosen = runs[runs["choice"] == choice]
+    return dict(zip(chosen["pair"], chosen[error], strict=True))
+
+
+def _text(row: dict[Hashable, Any] | None) -> str:
+    if row is None:
+        return MISSING
+    found = Estimate(row["difference"], row["half_width"], int(row["seeds"]))
+    spread = (
+        "" if found.half_width != found.half_width else f" ± {100 * (found.half_width or 0):.1f}"
+    )
+    return f"{100 * found.mean:+.1f}{spread} % ({found.n})"
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Writes the tables; returns the exit status, 1 where there is nothing to read."""
+    parser = argparse.ArgumentParser(
+        prog="python -m analysis.ceiling",
+        description="What an oracle gains against uniform choice in the runs of "
+        "`python -m ngi.studies.ceiling` below FOLDER: runs.csv, differences.csv, tables.md.",
+    )
+    parser.add_argument("folder", metavar="FOLDER", type=Path)
+    parser.add_argument("--output", metavar="PATH", type=Path, help="default: FOLDER")
+    arguments = parser.parse_args(argv)
+    try:
+        runs = read_runs(arguments.folder)
+    except ValueError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    output = arguments.output or arguments.folder
+    output.mkdir(parents=True, exist_ok=True)
+    found = differences(runs)
+    runs.to_csv(output / "runs.csv", index=False, float_format="%.6g")
+    found.to_csv(output / "differences.csv", index=False, float_format="%.4g")
+    text = "\n\n".join(to_markdown(table(found, error)) for error in ERRORS) + "\n"
+    (output / "tables.md").write_text(text)
+    print(text)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,124 @@
+"""The tables of ours, beside the paper's method and a denoiser, and of its parts.
+
+`python -m analysis.learner_table` writes them between markers of README.md and of
+docs/learner/README.md, from docs/learner/results.csv and ablation.csv. Both files are those of a
+report (`ngi report`), the latter on runs of `sweeps/learner`.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from analysis.readme_table import between_markers
+from analysis.runs import METRICS
+
+RESULTS = Path("docs/learner/results.csv")
+BEGIN, END = "<!-- learner: written by analysis.learner_table -->", "<!-- end of learner -->"
+
+ABLATION = Path("docs/learner/ablation.csv")
+OF_PARTS = ("<!-- parts: written by analysis.learner_table -->", "<!-- end of parts -->")
+OURS, PAPER = "ours", "active_exploration"
+
+METHODS = {
+    "ours": "ours",
+    "active_exploration": "the paper's method",
+    "path_tracing_oidn_8spp": "Open Image Denoise, 8 samples per pixel",
+    "path_tracing_oidn": "the same, 1 sample per pixel",
+}
+"""Columns, from the methods' names in the file."""
+
+PAGES = {
+    Path("README.md"): (("mape", "dssim"), list(METHODS)[:3]),
+    Path("docs/learner/README.md"): (("mape", "dssim", "mae", "lpips"), list(METHODS)),
+}
+"""Metrics and methods that each page shows."""
+
+
+def learner_table(results: pd.DataFrame, metrics: Sequence[str], methods: Sequence[str]) -> str:
+    """A row per scene: errors on its hard frames, the lowest of each metric in bold.
+
+    results: the report's table of results; only scenes that have every method are shown
+    """
+    heads = ["scene", "seeds", *(METHODS[method] for method in methods)]
+    lines = [_row(heads), _row([":--", "--:", *[":--"] * len(methods)])]
+    rows = results.set_index(["scene", "method"])
+    for scene in sorted(set(results["scene"])):
+        if any((scene, method) not in rows.index for method in methods):
+            continue
+        errors = pd.DataFrame(
+            {m: [rows.loc[(scene, m), f"hard_{metric}"] for metric in metrics] for m in methods}
+        ).round(3)
+        shown = errors.map(lambda value: f"{value:.3f}")
+        shown = shown.where(errors.ne(errors.min(axis=1), axis=0), "**" + shown + "**")
+        seeds = len(str(rows.loc[(scene, methods[0]), "seeds"]).split())
+        lines.append(_row([scene, str(seeds), *(" / ".join(shown[m]) for m in methods)]))
+    return "\n".join(lines)
+
+
+def parts_table(results: pd.DataFrame) -> str:
+    """A row per scene and part: the error without it and with it alone, against the wholes.
+
+    results: the report's table of results on `sweeps/learner`. Errors are geometric means of the
+    four metrics on hard frames; a difference is positive where there is more error. A scene whose
+    two whole methods are not both there, or which has no part, is left out.
+    """
+    error = np.exp(np.log(results[[f"hard_{metric}" for metric in METRICS]]).mean(axis=1))
+    error.index = pd.MultiIndex.from_frame(results[["scene", "method"]])
+    heads = ("scene", "part", "ours without it", "", "the paper's method with it", "")
+    lines = [_row(heads), _row([":--", ":--", "--:", "--:", "--:", "--:"])]
+    for scene in sorted(set(results["scene"])):
+        parts = dict.fromkeys(m.split("/")[1] for m in error[scene].index if "/" in m)
+        if not (parts and {OURS, PAPER} <= set(error[scene].index)):
+            continue
+        wholes = {"ours_without": error[scene, OURS], "paper_with": error[scene, PAPER]}
+        shown = [f"**{wholes['ours_without']:.4f}**", "", f"**{wholes['paper_with']:.4f}**", ""]
+        lines.append(_row([scene, "*the whole method*", *shown]))
+        for part in parts:
+            cells = []
+            for ablation, whole in wholes.items():
+                found = error.get((scene, f"{ablation}/{part}"))
+                cells += (
+                    ["", ""] if found is None else [f"{found:.4f}", f"{found / whole - 1:+.0%}"]
+                )
+            lines.append(_row([scene, part.replace("_", " "), *cells]))
+    return "\n".join(lines)
+
+
+def _row(cells: Sequence[str]) -> str:
+    return f"| {' | '.join(cells)} |"
+
+
+def written(page: str, results: pd.DataFrame, of: Path) -> str:
+    """The page with its table. Raises ValueError where its markers are missing."""
+    metrics, methods = PAGES[of]
+    table = learner_table(results, metrics, methods)
+    return between_markers(page, table, begin=BEGIN, end=END)
+
+
+def with_parts(page: str, results: pd.DataFrame) -> str:
+    """The page with its table of parts. Raises ValueError where its markers are missing."""
+    begin, end = OF_PARTS
+    return between_markers(page, parts_table(results), begin=begin, end=end)
+
+
+def main() -> int:
+    """Entry point; returns the exit status."""
+    try:
+        results = pd.read_csv(RESULTS)
+        for page in PAGES:
+            page.write_text(written(page.read_text(), results, page))
+        page = Path("docs/learner/README.md")
+        page.write_text(with_parts(page.read_text(), pd.read_csv(ABLATION)))
+    except (OSError, ValueError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

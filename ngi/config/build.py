@@ -1,0 +1,171 @@
+"""Builds the parts of a run, and what measuring its costs shares, from a Hydra configuration."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hydra.utils import instantiate
+from omegaconf import DictConfig, OmegaConf
+
+from ngi.machine.energy import EnergyMeter, energy_counters
+
+if TYPE_CHECKING:  # PyTorch and Lightning take seconds that --help need not wait for
+    from torch import nn
+
+    from ngi.learn import (
+        Budget,
+        Component,
+        Costs,
+        IlluminationModule,
+        Interruption,
+        PhaseClock,
+        Recorder,
+        Run,
+        RunFolder,
+        Samples,
+        Tracker,
+        TrainingStream,
+    )
+    from ngi.render import Renderer
+
+
+def build_samples(config: DictConfig, *, renderer: Renderer) -> Samples:
+    """What the run's training samples are."""
+    samples: Samples = instantiate(config.data)(renderer=renderer)
+    return samples
+
+
+def build_stream(
+    config: DictConfig, *, samples: Samples, clock: PhaseClock, patches: Path
+) -> TrainingStream:
+    """The stream of training batches. patches: folder that its store is archived in."""
+    from ngi import learn
+
+    return learn.TrainingStream(
+        samples=samples,
+        sampler=instantiate(config.sampler),
+        store=instantiate(config.reuse.store)(layout=samples.layout),
+        archive=learn.PatchArchive(patches),
+        policy=instantiate(config.reuse.policy),
+        schedule=instantiate(config.resolution),
+        clock=clock,
+        seed=config.seed,
+        when_late=config.reuse.when_late,
+    )
+
+
+def build_network(config: DictConfig, *, samples: Samples) -> nn.Module:
+    """The network for these samples, its weights as they are before the first step."""
+    from ngi import learn
+
+    network: nn.Module = learn.seeded(instantiate(config.model), seed=config.seed)(
+        layout=samples.layout, scene_dimensions=samples.network_dimensions
+    )
+    return network
+
+
+def build_module(
+    config: DictConfig, *, samples: Samples, stream: TrainingStream, folder: Path
+) -> IlluminationModule:
+    """Network, loss and optimiser, for these samples. folder: for the guard's report."""
+    from ngi import learn
+
+    return learn.IlluminationModule(
+        network=build_network(config, samples=samples),
+        loss=instantiate(config.loss),
+        optimizer=instantiate(config.optimizer),
+        example=samples.example,
+        stream=stream,
+        guard=learn.StepGuard(stream=stream, folder=folder),
+        averaging=instantiate(config.averaging),
+    )
+
+
+def build_run(
+    config: DictConfig,
+    *,
+    folder: RunFolder,
+    tracker: Tracker,
+    interruption: Interruption,
+    budget: Budget,
+    renderer: Renderer,
+) -> Run:
+    """All that takes part in a run. ValueError where its parts do not fit each other."""
+    from ngi import learn
+
+    schedule = instantiate(config.schedule)
+    schedule.check(budget)
+    clock = learn.PhaseClock(energy=EnergyMeter(energy_counters()))
+    samples = build_samples(config, renderer=renderer)
+    stream = build_stream(config, samples=samples, clock=clock, patches=folder.patches)
+    costs = folder.settings["costs"]
+    return learn.Run(
+        folder=folder,
+        tracker=tracker,
+        interruption=interruption,
+        budget=budget,
+        schedule=schedule,
+        renderer=renderer,
+        samples=samples,
+        stream=stream,
+        module=build_module(config, samples=samples, stream=stream, folder=folder.path),
+        run_clock=clock
+        if costs is None
+        else learn.ModelClock(costs=costs, counters=lambda: stream.counters),
+    )
+
+
+def build_recorder(config: DictConfig, run: Run) -> Recorder:
+    """What evaluates the run and writes down what is found."""
+    from ngi import learn
+
+    target_map = None
+    if config.evaluation.target_map is not None:
+        target_map = instantiate(config.evaluation.target_map)(
+            samples=run.samples,
+            resolution=instantiate(config.resolution).resolution(0),
+            signals=run.interruption.checked(run.module.signals),
+        )
+    evaluator = instantiate(config.evaluation.evaluator)(
+        renderer=run.renderer, test_inputs=run.samples.test_inputs
+    )
+    label = {**plain(config.label), "seed": config.seed}
+    return learn.Recorder(run, evaluator=evaluator, target_map=target_map, label=label)
+
+
+def run_components(config: DictConfig, *, renderer: Renderer) -> list[Component]:
+    """What the steps of this run spend time on, see `ngi.clock.costs`.
+
+    Nothing, where path tracing takes the network's place.
+    """
+    from ngi import learn
+
+    if "path_tracing" in config:
+        return []
+    scored = instantiate(config.sampler).needs_current
+    return learn.components(plain(config), renderer=renderer, scored=scored)
+
+
+def run_costs(config: DictConfig, *, budget: Budget, renderer: Renderer) -> Costs | None:
+    """What the model clock counts with; None for the wall clock.
+
+    Raises ValueError for costs that nobody has measured yet, and where batches depend on speed.
+    """
+    from ngi import learn
+
+    if budget.costs is None or budget.clock == "wall":
+        return None
+    if config.reuse.when_late != "wait":
+        raise ValueError(
+            f"reuse.when_late: '{config.reuse.when_late}' lets the speed of this machine decide "
+            "which batches are new; with budget.clock=model choose 'wait'"
+        )
+    return learn.CostFile(Path(budget.costs)).costs(run_components(config, renderer=renderer))
+
+
+def plain(config: DictConfig) -> dict[str, Any]:
+    """The resolved configuration as plain JSON data."""
+    container = OmegaConf.to_container(config, resolve=True, throw_on_missing=True)
+    assert isinstance(container, dict)
+    return {str(key): value for key, value in container.items()}

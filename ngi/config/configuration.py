@@ -1,0 +1,92 @@
+"""What Hydra has to know of this program, and which part of a configuration a run is told by."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import hydra
+from hydra.core.config_store import ConfigStore
+from omegaconf import DictConfig, OmegaConf
+
+import ngi
+from ngi.config.build import plain
+from ngi.config.names import run_group, run_name
+from ngi.files.resources import cache_folder, root
+from ngi.machine.precision import fast_precision
+from ngi.machine.size import bootstrap_batches, network_depth, network_width
+from ngi.scene import scenes
+
+if TYPE_CHECKING:
+    from ngi.learn import Costs
+
+NOT_IDENTITY = (
+    "run",
+    "viewer",
+    "tracker",
+    "label",
+    "budget.costs",
+    "renderer.scene",
+    "renderer.workers",
+    "renderer.cluster",
+    "evaluation.evaluator.cache",
+    "evaluation.evaluator.lpips",
+)
+"""Parts of the configuration that do not decide what a run computes: names, places, helpers."""
+
+
+def register() -> None:
+    """Makes scene folders options of the group `scene`, and the resolvers known to OmegaConf."""
+    os.environ["NGI_ROOT"] = str(root())
+    store = ConfigStore.instance()
+    for name, arguments in scenes().items():
+        reader = {"_target_": "ngi.scene.read_scene", **arguments}
+        store.store(group="scene", name=name, node={"name": name, "reader": reader})
+    OmegaConf.register_new_resolver("run_name", run_name, replace=True)
+    OmegaConf.register_new_resolver("run_group", run_group, replace=True)
+    OmegaConf.register_new_resolver("fast_precision", fast_precision, replace=True)
+    OmegaConf.register_new_resolver("network_width", network_width, replace=True)
+    OmegaConf.register_new_resolver("network_depth", network_depth, replace=True)
+    OmegaConf.register_new_resolver("bootstrap_batches", bootstrap_batches, replace=True)
+    OmegaConf.register_new_resolver("folder_name", lambda path: Path(path).name, replace=True)
+    OmegaConf.register_new_resolver(
+        "absolute_path", lambda *parts: str(Path(*parts).absolute()), replace=True
+    )
+    OmegaConf.register_new_resolver("cache_folder", lambda: str(cache_folder()), replace=True)
+
+
+def composed(*overrides: str) -> DictConfig:
+    """The configuration that these words of a command line give."""
+    register()
+    with hydra.initialize_config_dir(str(root() / "conf"), version_base="1.3"):
+        return hydra.compose("train", list(overrides))
+
+
+def scene_place(config: DictConfig) -> dict[str, Any] | None:
+    """What reads the scene, and from where, so that the run is found its scene again.
+
+    The reader's `_target_` and arguments, paths absolute; None for scenes of closed formulas.
+    """
+    if "scene" not in config.renderer:
+        return None
+    place = plain(config.scene.reader)
+    for key in ("folder", "path"):
+        if key in place:
+            place[key] = str(Path(place[key]).resolve())
+    return place
+
+
+def run_settings(config: DictConfig, *, scene_hash: str, costs: Costs | None) -> dict[str, Any]:
+    """What decides the result. Scene and costs count by content, not by where they lie."""
+    settings = plain(config)
+    for key in NOT_IDENTITY:
+        *path, last = key.split(".")
+        parent = settings
+        for part in path:
+            parent = parent[part]
+        parent.pop(last, None)
+    settings["scene"] = {"name": config.scene.name, "hash": scene_hash}
+    settings["costs"] = costs
+    settings["version"] = ngi.__version__
+    return settings

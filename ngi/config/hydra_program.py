@@ -1,0 +1,126 @@
+"""Programs that Hydra configures: what is wrong is said once, with the nearest of what there is."""
+
+from __future__ import annotations
+
+import logging
+import os
+import sys
+from collections.abc import Callable, Iterator
+from difflib import get_close_matches
+from typing import Any, NoReturn
+
+from hydra.core.hydra_config import HydraConfig
+from hydra.errors import (
+    CompactHydraException,
+    InstantiationException,
+    MissingConfigException,
+)
+from hydra.types import RunMode
+from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+log = logging.getLogger(__name__)
+
+TOLD = (ValueError, OSError, RuntimeError, FloatingPointError, TypeError, ImportError)
+MESSAGES = (*TOLD, InstantiationException)
+"""Exceptions whose text says to users what is wrong; all others are bugs."""
+
+FULL_ERROR = "HYDRA_FULL_ERROR"
+"""The environment variable that makes Hydra raise errors, which it would print otherwise."""
+NOT_FOR_USERS = ("hydra", "label")
+"""Parts of the configuration in which nobody means to change a key."""
+
+
+def run_program(program: Callable[[], None]) -> None:
+    """Calls a function that `hydra.main` has made.
+
+    Where its configuration cannot be composed or a job of a sweep has failed, the process ends with
+    status 1 and one message. Who sets HYDRA_FULL_ERROR=1 gets the exception with its traceback.
+    """
+    if os.environ.get(FULL_ERROR) == "1":
+        program()
+        return
+    os.environ[FULL_ERROR] = "1"
+    try:
+        program()
+    except (CompactHydraException, OmegaConfBaseException) as error:
+        sys.exit(explained(error))
+    except (OSError, ValueError) as error:  # where Hydra makes the folder, or its log in there
+        cause = error if isinstance(error, OSError) else error.__cause__
+        if not isinstance(cause, OSError):
+            raise
+        sys.exit(f"{cause}; choose another folder with run.folder=…, or see to its permissions")
+
+
+def fail(error: Exception, *, job: str) -> NoReturn:
+    """Ends a job whose error says to users what is wrong. job: its folder or name
+
+    A single one ends the process. Jobs of a sweep leave that to Hydra, which lets the others run
+    and reports only the first that has failed: each says for itself what was wrong.
+    """
+    message = _message(error)
+    log.error("%s", message)
+    log.debug("traceback", exc_info=True)
+    if HydraConfig.get().mode is RunMode.RUN:
+        raise SystemExit(1) from error
+    what = "see above" if _shares_the_terminal() else message
+    raise CompactHydraException(f"{job} failed: {what}") from error
+
+
+def _message(error: Exception) -> str:
+    """Without the class that could not be made, with the part of the configuration it is for."""
+    cause = error.__cause__
+    if not (isinstance(error, InstantiationException) and isinstance(cause, TOLD)):
+        return str(error)
+    key = str(error).rpartition("full_key: ")[2]
+    return str(cause) if key in str(cause) else f"{key}: {cause}"
+
+
+def explained(error: Exception) -> str:
+    """What Hydra has found wrong; of a key or an option that does not exist also the nearest."""
+    cause = error.__cause__
+    if isinstance(error, MissingConfigException) and error.options is not None:
+        group, _, option = str(error.missing_cfg_file).rpartition("/")
+        near = get_close_matches(option, error.options, n=1)
+        return (
+            f"{error.missing_cfg_file}: there is no such option; "
+            f"{group} can be {', '.join(error.options)}{_question(near)}"
+        )
+    if isinstance(cause, AttributeError | KeyError) and isinstance(cause, OmegaConfBaseException):
+        return _about_key(cause)
+    told = isinstance(cause, OmegaConfBaseException)
+    return f"{error}\n{cause}" if told else str(error)
+
+
+def _about_key(error: OmegaConfBaseException) -> str:
+    """error: of a key that its `parent_node` does not have"""
+    key, full_key, parent = str(error.key), str(error.full_key), error.parent_node
+    above = full_key.removesuffix(key)
+    known = list(_keys(OmegaConf.to_container(parent))) if isinstance(parent, DictConfig) else []
+    near = get_close_matches(key, known, n=1) or [k for k in known if k.endswith(f".{key}")]
+    if near:
+        return f"{full_key}: there is no such key{_question([above + near[0]])}"
+    there = ", ".join(above + k for k in known if "." not in k)
+    return f"{full_key}: there is no such key; there are {there} (+{full_key}=… adds one)"
+
+
+def _question(near: list[str]) -> str:
+    return f"; did you mean '{near[0]}'?" if near else ""
+
+
+def _keys(values: Any, path: str = "") -> Iterator[str]:
+    """Every key of nested mappings, with those above it: 'model.hidden_layers'."""
+    for name, value in values.items():
+        key = f"{path}{name}"
+        if key not in NOT_FOR_USERS and not key.endswith("_"):  # such as _target_
+            yield key
+            if isinstance(value, dict):
+                yield from _keys(value, f"{key}.")
+
+
+def _shares_the_terminal() -> bool:
+    """Whether what the job logs is shown where Hydra reports its failure.
+
+    Jobs of Submitit, on this machine or in a cluster, log into files of their own only.
+    """
+    return "submitit" not in HydraConfig.get().launcher._target_

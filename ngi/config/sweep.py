@@ -1,0 +1,131 @@
+"""A sweep from its start to its end: a table of its runs, a line after each, and what failed.
+
+Hydra calls this (`hydra.callbacks`), in the process that starts the sweep and, a copy of it, in
+those that its launcher starts.
+"""
+
+from __future__ import annotations
+
+import atexit
+import json
+import os
+import shutil
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from hydra.core.global_hydra import GlobalHydra
+from hydra.core.utils import JobReturn, JobStatus
+from hydra.errors import HydraException
+from hydra.experimental.callback import Callback
+from omegaconf import DictConfig
+from omegaconf.errors import OmegaConfBaseException
+
+from ngi.config.sweep_plan import (
+    Planned,
+    counted,
+    duration,
+    planned_run,
+    planned_runs,
+    shown,
+    table,
+)
+
+
+class Sweep(Callback):
+    """dry_run: whether the table is all that is wanted; Ends the program with status 0 then, or
+    with 1 where a run cannot start.
+    """
+
+    def __init__(self, *, dry_run: bool) -> None:
+        self._dry_run = dry_run
+        self._runs: list[Planned] = []
+        self._notes: Path | None = None  # a file per run that has ended, for all processes to see
+        self._begun = 0.0
+
+    def on_run_start(self, config: DictConfig, **_: Any) -> None:
+        if self._dry_run:
+            _show_and_exit([planned_run(config.copy(), {})])
+
+    def on_multirun_start(self, config: DictConfig, **_: Any) -> None:
+        runs = self._planned(config)
+        if self._dry_run:
+            _show_and_exit(runs)
+        if runs:
+            print(table(runs), flush=True)
+        self._runs = runs
+        self._begun = time.time()
+        self._notes = Path(config.hydra.sweep.dir, f".sweep-{os.getpid()}").resolve()
+        self._notes.mkdir(parents=True)
+        atexit.register(self._end)
+
+    def on_job_end(self, config: DictConfig, job_return: JobReturn, **_: Any) -> None:
+        if self._notes is None or not self._notes.is_dir():
+            return  # a run alone
+        note = {"folder": str(config.run.folder), "failure": _failure(job_return)}
+        (self._notes / f"{config.hydra.job.num}.json").write_text(json.dumps(note))
+        if self._runs:
+            ended = self._ended()
+            failed = sum(note["failure"] is not None for note in ended.values())
+            elapsed = time.time() - self._begun
+            print(progress(self._runs, [*ended], failed, elapsed), file=sys.stderr, flush=True)
+
+    def _planned(self, config: DictConfig) -> list[Planned]:
+        """None of a sweeper that chooses its runs as it goes, and where Hydra will say why not."""
+        try:
+            return planned_runs(config, GlobalHydra.instance().config_loader())
+        except (HydraException, OmegaConfBaseException) as error:
+            if self._dry_run:
+                sys.exit(str(error))
+            return []
+
+    def _ended(self) -> dict[int, dict[str, Any]]:
+        """Notes of runs that have ended, in whatever process, by their number."""
+        assert self._notes is not None
+        files = sorted(self._notes.glob("*.json"), key=lambda file: int(file.stem))
+        return {int(file.stem): json.loads(file.read_text()) for file in files}
+
+    def _end(self) -> None:
+        """Says at the end of the program which runs failed, and why."""
+        assert self._notes is not None
+        failures = [note for note in self._ended().values() if note["failure"] is not None]
+        shutil.rmtree(self._notes)
+        if failures:
+            lines = [f"  {shown(Path(note['folder']))}: {note['failure']}" for note in failures]
+            text = "\n".join([f"{counted(failures)} of this sweep failed:", *lines])
+            print(text, file=sys.stderr, flush=True)
+
+
+def progress(runs: Sequence[Planned], ended: Sequence[int], failed: int, elapsed: float) -> str:
+    """One line over all runs.
+
+    ended: numbers of the runs that are over; failed: how many of them failed; elapsed: seconds
+    What is left goes by the training that was left of each run when the sweep began.
+    """
+    known = [run.left for run in runs if run.runs and run.left]
+    typical = sum(known) / len(known) if known else 1.0
+    weights = [(run.left or typical) if run.runs else 0.0 for run in runs]
+    share = sum(weights[number] for number in ended) / (sum(weights) or 1.0)
+    parts = [f"sweep: {len(ended)} of {len(runs)} runs done"]
+    parts += [f"{failed} failed"] if failed else []
+    parts += [f"{duration(elapsed)} so far"]
+    parts += [f"about {duration(elapsed * (1 - share) / share)} left"] if 0 < share < 1 else []
+    return ", ".join(parts)
+
+
+def _failure(job: JobReturn) -> str | None:
+    """Why a run failed, in one line; None where it did not."""
+    if job.status != JobStatus.FAILED:
+        return None
+    error = job._return_value  # `return_value` would raise it
+    cause = error.__cause__ or error
+    return (str(cause).splitlines() or [type(cause).__name__])[0]
+
+
+def _show_and_exit(runs: Sequence[Planned]) -> None:
+    if not runs:
+        sys.exit("--dry-run: this sweeper chooses its runs as it goes; there is no plan to show")
+    print(table(runs))
+    sys.exit(int(any(run.state.startswith("cannot") for run in runs)))

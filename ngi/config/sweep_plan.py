@@ -1,0 +1,187 @@
+"""What the runs of a sweep are, how much of each is done, and how long the rest will take."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from hydra._internal.core_plugins.basic_sweeper import BasicSweeper
+from hydra.core.config_loader import ConfigLoader
+from hydra.core.hydra_config import HydraConfig
+from hydra.core.override_parser.overrides_parser import OverridesParser
+from hydra.errors import HydraException
+from hydra.utils import instantiate
+from omegaconf import DictConfig, open_dict, read_write
+from omegaconf.errors import OmegaConfBaseException
+from tabulate import tabulate
+from tqdm import tqdm
+
+from ngi.clock.counters import Counters
+from ngi.config.build import plain, run_components
+from ngi.config.configuration import run_settings
+from ngi.files.code_versions import code_version, code_versions, same_program
+from ngi.files.row_log import RowLog
+from ngi.files.run_folder import longer
+from ngi.learn import Budget, CostFile, ModelClock
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A run of a sweep.
+
+    state: 'finished', 'new', 'interrupted', 'longer' (finished with a smaller budget), 'again'
+        (`run.on_code_change=restart`), or else why it cannot start
+    done: part of its budget that is used up, 0 to 1
+    left: seconds of training that are left, at most; None where nobody knows, and 0 where a run
+        trains nothing
+    """
+
+    folder: Path
+    state: str
+    done: float
+    left: float | None
+
+    @property
+    def runs(self) -> bool:
+        """Whether there is something left to do that can be done."""
+        return self.state in ("new", "interrupted", "longer", "again")
+
+
+def planned_runs(config: DictConfig, loader: ConfigLoader) -> list[Planned]:
+    """One per job of a sweep; none where its sweeper chooses the jobs as it goes.
+
+    config: of the sweep, with Hydra's own part
+    """
+    sweeper = config.hydra.sweeper
+    if sweeper._target_ != f"{BasicSweeper.__module__}.{BasicSweeper.__name__}":
+        return []
+    words = [f"{key}={value}" for key, value in (sweeper.params or {}).items()]
+    words += list(config.hydra.overrides.task)
+    overrides = OverridesParser.create(config_loader=loader).parse_overrides(words)
+    (jobs,) = BasicSweeper.split_arguments(overrides, max_batch_size=None)
+    costs: dict[str, float | None] = {}
+    with tqdm(jobs, desc="plan", unit="run", leave=False, disable=None) as shown:
+        return [planned_run(loader.load_sweep_config(config, job), costs) for job in shown]
+
+
+def planned_run(config: DictConfig, costs: dict[str, float | None]) -> Planned:
+    """config: of one job, with Hydra's own part; costs: seconds per step, kept between calls"""
+    folder = Path(config.hydra.sweep.dir, config.hydra.sweep.subdir).resolve()
+    with read_write(config.hydra.runtime), open_dict(config.hydra.runtime):
+        config.hydra.runtime.output_dir = str(folder)
+    HydraConfig.instance().set_config(config)
+    with open_dict(config):
+        del config["hydra"]
+    try:
+        folder = Path(config.run.folder)
+        budget: Budget = instantiate(config.budget)
+        state = _state(config, folder)
+        done = _done(folder, budget) if state in ("interrupted", "longer") else 0.0
+        left = 0.0 if "path_tracing" in config else _left(config, budget, done, costs)
+    except (HydraException, OmegaConfBaseException, ValueError, OSError) as error:
+        cause = error.__cause__ or error
+        return Planned(folder, f"cannot start: {str(cause).splitlines()[0]}", 0.0, None)
+    if state == "finished":
+        done, left = 1.0, 0.0
+    return Planned(folder, state, done, left)
+
+
+def _state(config: DictConfig, folder: Path) -> str:
+    """As `RunFolder` will find it, but for scenes and costs that have changed meanwhile."""
+    made = [folder / name for name in ("result.json", "last.ckpt", "previous.ckpt")]
+    if not any(file.exists() for file in made):
+        return "new"
+    there = json.loads((folder / "settings.json").read_text())
+    ours = run_settings(config, scene_hash=there["scene"]["hash"], costs=there["costs"])
+    is_longer = longer(ours, than=there)
+    if ours != there and not is_longer:
+        raise ValueError("its folder holds another run; choose one with run.folder=…, or delete it")
+    versions = code_versions(folder)
+    if versions and not same_program(versions[-1], code_version()):
+        if config.run.on_code_change == "restart":
+            return "again"
+        if config.run.on_code_change == "refuse":
+            raise ValueError("the program has changed since, and run.on_code_change=refuse")
+    if not made[0].exists():
+        return "interrupted"
+    return "longer" if is_longer else "finished"
+
+
+def _done(folder: Path, budget: Budget) -> float:
+    last = RowLog(folder / "steps.csv").last_row
+    if last is None:
+        return 0.0
+    return min(
+        1.0, budget.fraction(steps=int(last["step"]), run_seconds=float(last["run_seconds"]))
+    )
+
+
+def _left(
+    config: DictConfig, budget: Budget, done: float, costs: dict[str, float | None]
+) -> float | None:
+    """By the seconds of the budget, or by its steps and what they were measured to cost."""
+    limits = [] if budget.seconds is None else [budget.seconds]
+    if budget.steps is not None:
+        key = json.dumps({**plain(config), "seed": 0, "run": 0, "label": 0, "budget": 0})
+        if key not in costs:
+            costs[key] = _seconds_per_step(config)
+        if (seconds := costs[key]) is not None:
+            limits.append(budget.steps * seconds)
+    return (1 - done) * min(limits) if limits else None
+
+
+def _seconds_per_step(config: DictConfig) -> float | None:
+    """Of a step with all that a step can have; None where that was never measured."""
+    file = CostFile(Path(config.budget.costs))
+    if not file.path.exists():
+        return None
+    renderer = instantiate(config.renderer)
+    try:
+        costs = file.costs(run_components(config, renderer=renderer))
+    except ValueError:
+        return None
+    finally:
+        renderer.close()
+    whole = Counters(iteration=1, generated_batches=1, scored_batches=1)
+    return ModelClock(costs=costs, counters=lambda: whole).run_seconds
+
+
+def table(runs: Sequence[Planned]) -> str:
+    """A row per run, and what it comes to."""
+    rows = [[shown(run.folder), run.state, f"{run.done:.0%}", duration(run.left)] for run in runs]
+    headers = ["run", "state", "done", "training left"]
+    states = Counter(run.state.split(":")[0] for run in runs)
+    total = [f"{count} {state}" for state, count in states.items()]
+    to_do = [run for run in runs if run.runs]
+    known = [run.left for run in to_do if run.left is not None]
+    summary = f"{counted(runs)}: {', '.join(total)}"
+    if known:
+        summary += f"; at most {duration(sum(known))} of training left"
+    if len(known) < len(to_do):
+        what = "they take" if not known else f"{len(to_do) - len(known)} of them take"
+        summary += f"; how long {what} is not known, `ngi costs` with the same words measures it"
+    return f"{tabulate(rows, headers)}\n\n{summary}; evaluations and references come on top"
+
+
+def counted(runs: Sequence[Any]) -> str:
+    return "1 run" if len(runs) == 1 else f"{len(runs)} runs"
+
+
+def duration(seconds: float | None) -> str:
+    """'1:02:03', '2:03', or '?'."""
+    if seconds is None:
+        return "?"
+    minutes, rest = divmod(math.ceil(seconds - 1e-6), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
+
+
+def shown(folder: Path) -> str:
+    """Relative to here, if it is below."""
+    here = Path.cwd()
+    return str(folder.relative_to(here) if folder.is_relative_to(here) else folder)

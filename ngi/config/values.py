@@ -1,0 +1,86 @@
+"""Finds values of a configuration that its parts cannot be made with, before any is made."""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Callable, Iterator
+from types import NoneType, UnionType
+from typing import Any, Union, get_args, get_origin, get_type_hints
+
+from hydra.utils import get_object
+from omegaconf import DictConfig
+
+LARGEST_INTEGER = 2**31 - 1
+"""What fits everywhere: into tensors' sizes, Mitsuba's parameters, random seeds."""
+
+_KINDS = {int: "an integer", float: "a finite number", bool: "true or false", str: "a text"}
+_BESIDE: dict[str, Any] = {
+    "seed": int,
+    "evaluation.count": int,
+    "run.checkpoint_seconds": float,
+    "run.checkpoint_steps": int | None,
+    "run.linear_megabytes": float,
+    "run.on_code_change": str,
+    "run.viewer_port": int,
+    "viewer": bool,
+}
+"""Kinds of values that are no argument of a class."""
+
+
+def check_values(config: DictConfig) -> None:
+    """ValueError, naming key and value, for one that is not of the kind its class says.
+
+    Checked are numbers, true and false, and texts; integers have at most 31 bits, and no number is
+    NaN or infinite. What a class accepts beyond that it says itself.
+    """
+    for key, value, kind in (*_arguments(config, ""), *_others(config)):
+        kinds = get_args(kind) if get_origin(kind) in (Union, UnionType) else (kind,)
+        if isinstance(value, DictConfig) and "_target_" in value:
+            continue  # an object, whatever its class
+        wanted = [_KINDS[k] for k in kinds if k in _KINDS]
+        open_ended = any(get_origin(k) is not None or not inspect.isclass(k) for k in kinds)
+        if not wanted or open_ended or any(_fits(value, k) for k in kinds):
+            continue
+        wanted += ["null"] * (NoneType in kinds)
+        text = repr(value)
+        shown = text if len(text) < 60 else f"{text[:40]}…"
+        raise ValueError(f"{key}: {shown} is not {' or '.join(wanted)} that can be used here")
+
+
+def _arguments(node: DictConfig, path: str) -> Iterator[tuple[str, Any, Any]]:
+    """Key, value and annotation of every argument that a class of the configuration is given."""
+    hints = _hints(get_object(node["_target_"])) if "_target_" in node else {}
+    for name in node:
+        value, key = node[name], f"{path}{name!s}"
+        if name in hints:
+            yield key, value, hints[name]
+        if isinstance(value, DictConfig) and key not in ("hydra", "label"):
+            yield from _arguments(value, f"{key}.")
+
+
+def _others(config: DictConfig) -> Iterator[tuple[str, Any, Any]]:
+    for key, kind in _BESIDE.items():
+        value: Any = config
+        for name in key.split("."):
+            value = value[name]
+        yield key, value, kind
+
+
+def _hints(target: Callable[..., Any]) -> dict[str, Any]:
+    function = target.__init__ if inspect.isclass(target) else target
+    try:
+        return get_type_hints(function)
+    except (NameError, TypeError):  # imported for the type checker only
+        return {}
+
+
+def _fits(value: object, kind: type) -> bool:
+    if kind in (int, float) and isinstance(value, bool):
+        return False
+    if kind is int:
+        return isinstance(value, int) and abs(value) <= LARGEST_INTEGER
+    if kind is float:
+        small = not isinstance(value, int) or abs(value) <= LARGEST_INTEGER**2
+        return isinstance(value, int | float) and small and math.isfinite(value)
+    return isinstance(value, kind)

@@ -1,0 +1,106 @@
+"""A regression forest: what a value is, on average, where samples of it are near."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+PRIOR = 2.0
+"""Samples of the overall mean that every leaf holds beside its own."""
+
+
+@dataclass(frozen=True)
+class Forest:
+    """T trees of `depth` levels; node k of a level has the children 2 k and 2 k + 1.
+
+    Points at or above a node's threshold go to its second child; a node that does not split has the
+    threshold infinity.
+
+    feature: per level, [T, nodes] int64; threshold: per level, [T, nodes]
+    leaf: [T, 2^depth], mean value
+    """
+
+    feature: tuple[Tensor, ...]
+    threshold: tuple[Tensor, ...]
+    leaf: Tensor
+
+    def __call__(self, points: Tensor) -> Tensor:
+        """Mean of the trees' values at n points [n, S], [n]."""
+        node = torch.zeros(len(self.leaf), len(points), dtype=torch.int64)
+        for feature, threshold in zip(self.feature, self.threshold, strict=True):
+            coordinate = points.T.gather(0, feature.gather(1, node))
+            node = 2 * node + (coordinate >= threshold.gather(1, node))
+        return self.leaf.gather(1, node).mean(dim=0)
+
+
+def grow(
+    points: Tensor,
+    values: Tensor,
+    generator: torch.Generator,
+    *,
+    trees: int,
+    depth: int,
+    smallest_leaf: int,
+) -> Forest:
+    """Extremely randomised trees (Geurts et al. 2006) through all samples.
+
+    A node tries one threshold per variable, drawn between the least and the largest of its samples,
+    and takes the one that lowers the squared error most, as long as both children hold
+    `smallest_leaf` samples. Few variables that matter are so found among many that do not.
+
+    points: [m, S] with m > 0; values: [m], finite
+    """
+    columns = points.T  # [S, m]
+    node = torch.zeros(trees, len(points), dtype=torch.int64)
+    features, thresholds = [], []
+    for level in range(depth):
+        nodes = 2**level
+        threshold = _thresholds(columns, node, nodes, generator)  # [T, S, nodes]
+        gain = _gains(columns, values, node, threshold, smallest_leaf)
+        best, feature = gain.max(dim=1)  # [T, nodes]
+        chosen = threshold.gather(1, feature[:, None])[:, 0]
+        chosen = torch.where(best > -torch.inf, chosen, torch.inf)
+        coordinate = columns.gather(0, feature.gather(1, node))
+        node = 2 * node + (coordinate >= chosen.gather(1, node))
+        features.append(feature)
+        thresholds.append(chosen)
+    count, total = _sums(values, node, 2**depth)
+    mean = (total + PRIOR * values.mean()) / (count + PRIOR)
+    return Forest(tuple(features), tuple(thresholds), mean)
+
+
+def _thresholds(columns: Tensor, node: Tensor, nodes: int, generator: torch.Generator) -> Tensor:
+    """[T, S, nodes] between the samples of each node; NaN or infinite in an empty one."""
+    trees, (dimensions, _) = len(node), columns.shape
+    index = node[:, None].expand(-1, dimensions, -1)
+    spread = columns.expand(trees, -1, -1)
+    shape = trees, dimensions, nodes
+    low = columns.new_full(shape, torch.inf).scatter_reduce(2, index, spread, "amin")
+    high = columns.new_full(shape, -torch.inf).scatter_reduce(2, index, spread, "amax")
+    return low + (high - low) * torch.rand(shape, generator=generator)
+
+
+def _gains(
+    columns: Tensor, values: Tensor, node: Tensor, threshold: Tensor, smallest_leaf: int
+) -> Tensor:
+    """[T, S, nodes]: sum²/count over both children, -inf where one is too small."""
+    trees, dimensions, nodes = threshold.shape
+    index = node[:, None].expand(-1, dimensions, -1)
+    right = (columns >= threshold.gather(2, index)).to(values)  # [T, S, m]
+    zero = values.new_zeros(trees, dimensions, nodes)
+    count_right = zero.scatter_add(2, index, right)
+    sum_right = zero.scatter_add(2, index, right * values)
+    count, total = (sums[:, None] for sums in _sums(values, node, nodes))
+    count_left, sum_left = count - count_right, total - sum_right
+    gain = sum_left**2 / count_left + sum_right**2 / count_right
+    fits = (count_left >= smallest_leaf) & (count_right >= smallest_leaf)
+    return torch.where(fits, gain, -torch.inf)
+
+
+def _sums(values: Tensor, node: Tensor, nodes: int) -> tuple[Tensor, Tensor]:
+    """Number and sum of the values in each node, [T, nodes]."""
+    zero = values.new_zeros(len(node), nodes)
+    spread = values.expand(len(node), -1)
+    return zero.scatter_add(1, node, torch.ones_like(spread)), zero.scatter_add(1, node, spread)

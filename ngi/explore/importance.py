@@ -1,0 +1,74 @@
+"""Densities in proportion to what is to be gained, never far below a uniform one."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+
+@dataclass(frozen=True, kw_only=True)
+class Importance:
+    """A defensive mixture over m candidates (Hesterberg 1995): of uniform and of valued ones,
+
+        p_i = α / m + (1 - α) · value_i^power / Σ_j value_j^power.
+
+    uniform_share: α, in [0, 1]; 1 is the uniform density. As p_i >= α / m, no weight exceeds 1 / α
+    power: of the values, above 0
+    weighted: whether losses are weighted back to uniform candidates; else what is drawn often
+        counts often
+    Raises ValueError for numbers outside these ranges, and for weights without a bound (α = 0).
+    """
+
+    uniform_share: float
+    power: float = 1.0
+    weighted: bool = False
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.uniform_share <= 1:
+            raise ValueError(f"uniform_share: {self.uniform_share}: give a number in [0, 1]")
+        if not 0 < self.power < math.inf:
+            raise ValueError(f"power: {self.power}: give a number above 0")
+        if self.weighted and self.uniform_share == 0:
+            raise ValueError(
+                "uniform_share: 0 with weighted: true: the weights would have no bound; give a "
+                "share above 0, the largest weight is its inverse"
+            )
+
+    def probabilities(self, values: Tensor) -> Tensor:
+        """Of m candidates, [m] float64 with sum 1.
+
+        values: [m], at least 0; those that are NaN or infinite count as 0, and where all are 0 the
+        density is uniform. Raises ValueError for negative ones.
+        """
+        values = torch.where(values.isfinite(), values, 0.0).double()
+        if (values < 0).any():
+            raise ValueError(f"values: {values.min().item()} is among them: give at least 0")
+        uniform = torch.full_like(values, 1 / len(values))
+        largest = values.max()
+        if largest == 0:
+            return uniform
+        valued = (values / largest) ** self.power
+        return self.uniform_share * uniform + (1 - self.uniform_share) * valued / valued.sum()
+
+    def weights(self, probabilities: Tensor) -> Tensor:
+        """1 / (m p_i) where `weighted`, else 1: factors of the losses, [m] float64."""
+        if not self.weighted:
+            return torch.ones_like(probabilities)
+        return 1 / (len(probabilities) * probabilities)
+
+    def draw(self, values: Tensor, count: int, generator: torch.Generator) -> tuple[Tensor, Tensor]:
+        """`count` different candidates, [count] int64, and their weights, [count] float64.
+
+        Raises ValueError for more than there are. Where fewer than `count` have any value, the
+        rest is drawn from the others.
+        """
+        if count > len(values):
+            raise ValueError(f"count: {count} of {len(values)} candidates: there are not so many")
+        probabilities = self.probabilities(values)
+        # The largest of p_i / Exponential(1) are drawn without replacement (Efraimidis 2006).
+        clocks = torch.empty_like(probabilities).exponential_(generator=generator)
+        chosen = (probabilities.clamp(min=1e-300).log() - clocks.log()).topk(count).indices
+        return chosen, self.weights(probabilities)[chosen]

@@ -1,0 +1,137 @@
+"""Independent states, more of them where the loss is predicted to be high."""
+
+# ruff: noqa: ARG002 - a sampler is given more than it need look at
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import torch
+from torch import Tensor
+
+from ngi.explore.chains import ChainInfo, ChainState
+from ngi.explore.forest import grow
+from ngi.explore.importance import Importance
+from ngi.explore.proposals import Proposals
+from ngi.explore.targets import Constant
+
+
+@dataclass(frozen=True)
+class PredictedState(ChainState):
+    """What the next states are predicted from, beside those that were drawn last.
+
+    seen: [m, S], the newest states that were rendered, oldest first
+    loss: [m], what each lost when it was new: before the network was trained on it
+    """
+
+    seen: Tensor
+    loss: Tensor
+
+
+class PredictedLoss:
+    """A sampler without chains: every state is drawn anew, by the loss that is predicted there.
+
+    Out of `candidates` uniform states n are drawn, without replacement, with the density that
+    `importance` makes of their predicted losses. The prediction is a regression forest through the
+    states that were rendered last and their losses as they were new, which is what states that the
+    network has not met would lose: nothing is rendered for it, and the network is not asked.
+
+    chains: n, states in a batch
+    candidates: per batch, at least n
+    memory: states that are remembered; the losses of older ones are those of another network
+    trees, depth, smallest_leaf: see `ngi.explore.forest.grow`
+    Raises ValueError for numbers out of range.
+    """
+
+    needs_current = False
+
+    def __init__(
+        self,
+        *,
+        chains: int,
+        candidates: int,
+        importance: Importance,
+        memory: int,
+        trees: int,
+        depth: int,
+        smallest_leaf: int,
+    ) -> None:
+        for name, value, least in (
+            ("chains", chains, 1),
+            ("candidates", candidates, chains),
+            ("memory", memory, 2 * chains),
+            ("trees", trees, 1),
+            ("depth", depth, 1),
+            ("smallest_leaf", smallest_leaf, 1),
+        ):
+            if value < least:
+                raise ValueError(f"sampler.{name}: {value}: give at least {least}")
+        self.chains = chains
+        self.target = Constant()
+        self._candidates = candidates
+        self._importance = importance
+        self._memory = memory
+        self._forest = {"trees": trees, "depth": depth, "smallest_leaf": smallest_leaf}
+
+    def init(self, state_dimensions: int) -> PredictedState:
+        """See `MarkovChains.init`: nothing seen yet."""
+        if state_dimensions < 2:
+            raise ValueError(
+                f"state_dimensions: {state_dimensions}: give at least 2, for the patch position"
+            )
+        return PredictedState(
+            position=torch.zeros(self.chains, state_dimensions),
+            patch=torch.full((self.chains,), -1),
+            age=torch.zeros(self.chains, dtype=torch.int64),
+            seen=torch.zeros(0, state_dimensions),
+            loss=torch.zeros(0),
+        )
+
+    def propose(
+        self, state: PredictedState, generator: torch.Generator, *, batch: int
+    ) -> Proposals:
+        """A batch of states, uniform ones as long as fewer than 2 n were seen."""
+        shape = self._candidates, state.position.shape[1]
+        candidates = torch.empty(shape).uniform_(generator=generator)
+        chosen, weights = self._importance.draw(
+            self.predicted(state, candidates, generator), self.chains, generator
+        )
+        return Proposals(
+            position=candidates[chosen],
+            large_step=torch.ones(self.chains, dtype=torch.bool),
+            weight=weights.float() if self._importance.weighted else None,
+        )
+
+    def predicted(
+        self, state: PredictedState, states: Tensor, generator: torch.Generator
+    ) -> Tensor:
+        """Loss of each of k states [k, S], [k]; the same for all while too few were seen."""
+        if len(state.seen) < 2 * self.chains:
+            return torch.ones(len(states))
+        return grow(state.seen, state.loss, generator, **self._forest)(states)
+
+    def accept(
+        self,
+        state: PredictedState,
+        proposals: Proposals,
+        patch_ids: Tensor,
+        target_current: Tensor | None,
+        target_proposed: Tensor,
+        generator: torch.Generator,
+        *,
+        losses: Tensor,
+    ) -> tuple[PredictedState, ChainInfo]:
+        """Remembers the proposals' losses, [n]; those that are NaN or infinite are forgotten."""
+        known = losses.isfinite()
+        seen = torch.cat([state.seen, proposals.position[known]])
+        loss = torch.cat([state.loss, losses[known]])
+        moved = replace(
+            state,
+            position=proposals.position,
+            patch=patch_ids,
+            age=torch.zeros_like(state.age),
+            seen=seen[-self._memory :],
+            loss=loss[-self._memory :],
+        )
+        everywhere = torch.ones(self.chains, dtype=torch.bool)
+        return moved, ChainInfo(everywhere, everywhere, ~state.occupied, moved.age)

@@ -1,0 +1,50 @@
+"""What chooses the states that are rendered: Markov chains, or independent draws."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import torch
+from torch import Tensor
+
+from ngi.explore.chains import ChainInfo
+from ngi.explore.proposals import Proposals
+from ngi.explore.targets import Target
+
+
+class Sampler(Protocol):
+    """Pure functions on a state of its own kind, a `ChainState` or derived from it."""
+
+    chains: int
+    """n, the number of patches in a generated batch."""
+    target: Target
+
+    @property
+    def needs_current(self) -> bool:
+        """Whether the states where it stands have to be scored, too."""
+        ...
+
+    def init(self, state_dimensions: int) -> Any:
+        """The state at the start of a run, for states of S = D + 2 dimensions."""
+        ...
+
+    def propose(self, state: Any, generator: torch.Generator, *, batch: int) -> Proposals:
+        """The n states to render next. batch: how often the run has proposed before."""
+        ...
+
+    def accept(
+        self,
+        state: Any,
+        proposals: Proposals,
+        patch_ids: Tensor,
+        target_current: Tensor | None,
+        target_proposed: Tensor,
+        generator: torch.Generator,
+        *,
+        losses: Tensor,
+    ) -> tuple[Any, ChainInfo]:
+        """The state once they are rendered: see `MarkovChains.accept`.
+
+        losses: [n], the proposals' training losses before the network was trained on them
+        """
+        ...

@@ -1,0 +1,1 @@
+"""What lies on disk: where, a run's folder and its logs, and writing that a crash cannot halve."""

@@ -1,0 +1,79 @@
+"""Every version of the code that made a run: no part of its identity, but of its record."""
+
+from __future__ import annotations
+
+import json
+import logging
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from ngi.files.durable import write_atomically
+from ngi.machine.provenance import code_commit, code_hash
+
+log = logging.getLogger(__name__)
+
+FILE = "commits.json"
+
+
+@cache
+def code_version() -> dict[str, Any]:
+    """'commit' (None outside git), 'dirty', and 'code', a hash over this package's modules.
+
+    As they are when it is first asked for: a process loads its modules once.
+    """
+    commit, dirty = code_commit()
+    return {"commit": commit, "dirty": dirty, "code": code_hash()}
+
+
+def code_versions(folder: Path) -> list[dict[str, Any]]:
+    """Of a run, in order: `code_version`, and 'after_step' from which on it was made with it.
+
+    Empty for runs of before this was recorded; those of before it had them lack 'code'. Raises
+    ValueError where the file is damaged.
+    """
+    path = folder / FILE
+    if not path.exists():
+        return []
+    try:
+        found: list[dict[str, Any]] = json.loads(path.read_text())
+        _ = [(entry["commit"], entry["dirty"], entry["after_step"]) for entry in found]
+    except (ValueError, KeyError, TypeError) as error:
+        raise ValueError(f"{path} is damaged ({error}); delete it, and the run goes on") from error
+    return found
+
+
+def record_code_version(folder: Path, *, after_step: int) -> None:
+    """Adds the version with which a run is begun or goes on, and warns where it is another one.
+
+    after_step: the last step that is kept of what was made before
+    """
+    found, version = code_versions(folder), code_version()
+    if found and same_program(found[-1], version):
+        return
+    if found and after_step > 0:
+        log.warning(
+            "%s: goes on with %s; up to step %d it was made with %s. If what is computed has "
+            "changed in between, run.on_code_change=restart begins it afresh",
+            folder,
+            shown(version),
+            after_step,
+            shown(found[-1]),
+        )
+    kept = [entry for entry in found if entry["after_step"] < after_step]
+    content = [*kept, {**version, "after_step": after_step}]
+    write_atomically(folder / FILE, json.dumps(content, indent=2).encode())
+
+
+def same_program(earlier: dict[str, Any], now: dict[str, Any]) -> bool:
+    """Whether two versions compute the same, as far as is known."""
+    if "code" in earlier:
+        return bool(earlier["code"] == now["code"])
+    return bool(earlier["commit"] == now["commit"]) and not (earlier["dirty"] or now["dirty"])
+
+
+def shown(version: dict[str, Any]) -> str:
+    """'commit 0123456789ab and uncommitted changes (0123abcd)'."""
+    code = f" ({version['code'][:8]})" if "code" in version else ""
+    commit = f"commit {version['commit'][:12]}" if version["commit"] else f"code outside git{code}"
+    return f"{commit} and uncommitted changes{code}" if version["dirty"] else commit

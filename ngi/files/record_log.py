@@ -1,0 +1,101 @@
+"""A binary file that grows record by record and can be cut back to an earlier step.
+
+It is for arrays, as `RowLog` is for numbers, and NumPy alone reads it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ngi.files.durable import full_disk_named
+from ngi.files.growing_file import GrowingFile
+
+
+class RecordLog(GrowingFile[BinaryIO]):
+    """Records of equal size with an ascending `step`, appended to a file.
+
+    The first line is JSON: `description`, and `fields`, a list of name, NumPy type and shape. The
+    records follow without gaps, each the bytes of its fields in this order. The fields are those
+    of the file, or else of the first record.
+
+    description: says in the file what the fields mean
+    Raises ValueError for a record with other fields, types or shapes, and for a damaged first line.
+    """
+
+    def __init__(self, path: Path, *, description: str) -> None:
+        super().__init__(path)
+        self._description = description
+        self._dtype = np.dtype([])
+
+    def append(self, record: Mapping[str, ArrayLike]) -> None:
+        arrays = {name: np.asarray(value) for name, value in record.items()}
+        dtype = np.dtype([(name, array.dtype, array.shape) for name, array in arrays.items()])
+        if self._stream is None:
+            with full_disk_named(self.path):
+                self._open(dtype)
+        assert self._stream is not None
+        if dtype != self._dtype:
+            raise ValueError(
+                f"{self.path}: a record of {_fields(dtype)} does not fit the file's records of "
+                f"{_fields(self._dtype)}; a run with other arrays needs a folder of its own"
+            )
+        with full_disk_named(self.path):
+            self._stream.write(b"".join(array.tobytes() for array in arrays.values()))
+
+    def keep_until(self, step: int) -> int:
+        """Drops records after `step` and returns how many.
+
+        What a run did after its last checkpoint is done again.
+        """
+        self.close()
+        if not self.path.exists():
+            return 0
+        with self.path.open("rb") as stream:
+            dtype = self._read_header(stream)
+            if dtype is None:
+                size = dropped = 0
+            else:
+                start = stream.tell()
+                steps = np.fromfile(stream, dtype)["step"]  # a record cut short is left out
+                # What a power cut leaves may be zeros: only what ascends from the start counts.
+                good = (steps <= step) & (np.diff(steps, prepend=-1) > 0)
+                kept = int(np.logical_and.accumulate(good).sum())
+                size, dropped = start + dtype.itemsize * kept, len(steps) - kept
+        os.truncate(self.path, size)
+        return dropped
+
+    def _open(self, dtype: np.dtype) -> None:
+        if self.path.exists():
+            with self.path.open("rb") as stream:
+                dtype_there = self._read_header(stream)
+        else:
+            dtype_there = None
+        self._stream = self.path.open("ab")
+        self._dtype = dtype if dtype_there is None else dtype_there
+        if dtype_there is None:
+            header = {"description": self._description, "fields": _fields(dtype)}
+            self._stream.write(json.dumps(header).encode() + b"\n")
+
+    def _read_header(self, stream: BinaryIO) -> np.dtype | None:
+        """None where the first line was cut short, before any record was written."""
+        line = stream.readline()
+        if not line.endswith(b"\n"):
+            return None
+        try:
+            return np.dtype([(n, t, tuple(shape)) for n, t, shape in json.loads(line)["fields"]])
+        except (ValueError, KeyError, TypeError) as error:
+            raise ValueError(
+                f"{self.path} is damaged (first line: {error}); put back a copy, or delete it and "
+                "the same command begins a new one at the last checkpoint"
+            ) from error
+
+
+def _fields(dtype: np.dtype) -> list[list[object]]:
+    return [[name, dtype[name].base.str, list(dtype[name].shape)] for name in dtype.names or ()]

@@ -1,0 +1,207 @@
+"""A run's folder: its identity, its files, and whether it is new, interrupted or finished."""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import json
+import math
+import shutil
+from contextlib import ExitStack
+from os.path import relpath
+from pathlib import Path
+from typing import Any, TextIO
+
+from ngi.files import code_versions
+from ngi.files.durable import write_atomically
+from ngi.files.record_log import RecordLog
+from ngi.files.records import CHAINS, TARGET_MAPS
+from ngi.files.row_log import RowLog
+
+TRACKED = "tracker.json"
+"""By which trackers know the run: see `ngi.learn.remote_tracker.kept_id`."""
+
+
+class RunFolder:
+    """The folder of one run. A run's identity is the hash of what decides its result.
+
+    How long it trains is no part of it: a run can be trained longer, in its folder.
+
+    settings: everything that decides the result (resolved configuration, scene hash, version),
+        as plain JSON data.
+    linear_megabytes: see `Evaluation.write`
+    lengthened: whether the folder holds the same run with a smaller budget
+    restarted: set where what the folder holds of this run is to be deleted by `begin`
+    Raises ValueError where the folder holds another run, RuntimeError where another process is
+    training in it, OSError where it can not be written to. Nothing in the folder is touched before
+    that is known.
+    """
+
+    def __init__(
+        self, path: Path, *, settings: dict[str, Any], linear_megabytes: float = 0.0
+    ) -> None:
+        self.path = path
+        self.settings = settings
+        self.linear_megabytes = linear_megabytes
+        canonical = json.dumps(_without_limits(settings)[0], sort_keys=True)
+        self.identity = hashlib.sha256(canonical.encode()).hexdigest()[:16]
+        self.checkpoint = path / "last.ckpt"
+        self.previous_checkpoint = path / "previous.ckpt"
+        self.stable_checkpoint = path / "stable.ckpt"  # the last before the learning rate decayed
+        self._checkpoints = (self.checkpoint, self.previous_checkpoint, self.stable_checkpoint)
+        self.patches = path / "patches"
+        self.metrics = RowLog(path / "metrics.csv")
+        self.steps = RowLog(path / "steps.csv")
+        self.chains = RecordLog(path / "chains.bin", description=CHAINS)
+        self.target_maps = RecordLog(path / "target_map.bin", description=TARGET_MAPS)
+        self.logs = (self.steps, self.metrics, self.chains, self.target_maps)
+        self._result = path / "result.json"
+        self._settings = path / "settings.json"
+        self.lengthened = False
+        self.restarted = False
+        self._lock = self._acquire_lock()
+        self._check_identity()
+
+    @property
+    def name(self) -> str:
+        """What a progress bar calls it: its path from here, the last three parts at most."""
+        return "/".join(Path(relpath(self.path)).parts[-3:])
+
+    @property
+    def result(self) -> dict[str, Any] | None:
+        """The finished run's result, or None while the run is not finished."""
+        if self.lengthened or self.restarted or not self._result.exists():
+            return None
+        try:
+            return json.loads(self._result.read_text())
+        except ValueError as error:
+            raise ValueError(
+                f"{self._result} is damaged ({error}); delete it, and the same command evaluates "
+                "the run again from its last checkpoint"
+            ) from error
+
+    @property
+    def has_something(self) -> bool:
+        """Whether there is a result or a checkpoint; before that there is nothing to lose."""
+        return any(file.exists() for file in (*self._checkpoints, self._result))
+
+    def begin(self, *, scene_place: dict[str, Any] | None = None) -> None:
+        """Makes the folder this run's, once everything is built and training can start.
+
+        scene_place: where the scene lies, kept in scene.json; no part of the identity
+        """
+        if self.lengthened:
+            self._result.unlink(missing_ok=True)  # of the shorter run
+        if self.restarted:
+            self._forget()
+        _write_json(self._settings, self.settings)
+        if scene_place is not None:
+            _write_json(self.path / "scene.json", scene_place)
+
+    def _forget(self) -> None:
+        """Deletes what this run would go on with; checkpoints first, on which the rest depends."""
+        logs = (log.path for log in self.logs)
+        others = (self.path / name for name in (code_versions.FILE, TRACKED))
+        for file in (*self._checkpoints, self._result, *logs, *others):
+            file.unlink(missing_ok=True)
+        shutil.rmtree(self.patches, ignore_errors=True)
+
+    def write_result(self, result: dict[str, Any]) -> dict[str, Any]:
+        """Writes and returns it, with what only the folder knows.
+
+        That is every version of the code that it was made with, and the logs' lengths and
+        checksums, by which damage is seen.
+        """
+        logs = {log.path.name: log.fingerprint() for log in self.logs}
+        whole = {
+            **result,
+            "commits": code_versions.code_versions(self.path),
+            "logs": {name: found for name, found in logs.items() if found},
+        }
+        _write_json(self._result, whole)
+        return whole
+
+    def close(self) -> None:
+        """Writes the logs out and lets other processes use the folder."""
+        with ExitStack() as stack:
+            for part in (self._lock, *self.logs):
+                stack.callback(part.close)
+
+    def _acquire_lock(self) -> TextIO:
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+            lock = (self.path / ".lock").open("w")
+        except OSError as error:
+            raise OSError(
+                error.errno,
+                f"{error.strerror}: this run's folder can not be written to; choose another one "
+                "with run.folder=…, or see to its permissions",
+                str(self.path),
+            ) from error
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            lock.close()
+            raise RuntimeError(
+                f"{self.path}: another process is training this run; wait for it or stop it"
+            ) from error
+        return lock
+
+    def _check_identity(self) -> None:
+        if not (self._settings.exists() and self.has_something):
+            return
+        try:
+            earlier = json.loads(self._settings.read_text())
+        except ValueError as error:
+            self._lock.close()
+            raise ValueError(
+                f"{self._settings} is damaged ({error}); delete it if you are sure that this "
+                "folder holds the same run"
+            ) from error
+        if isinstance(earlier, dict) and longer(self.settings, than=earlier):
+            self.lengthened = True
+            return
+        earlier, now = _flatten(earlier), _flatten(self.settings)
+        different = [
+            f"{key}: {earlier.get(key, 'absent')!r} there, {now.get(key, 'absent')!r} now"
+            for key in sorted(earlier.keys() | now.keys())
+            if earlier.get(key) != now.get(key)
+        ]
+        if different:
+            self._lock.close()
+            raise ValueError(
+                f"{self.path} holds another run ({'; '.join(different[:3])}"
+                f"{'; …' if len(different) > 3 else ''}); choose another folder with run.folder=…, "
+                "or delete that one"
+            )
+
+
+def longer(settings: dict[str, Any], *, than: dict[str, Any]) -> bool:
+    """Whether these are settings of the same run with a larger budget, and it trains."""
+    (now, limits), (earlier, former) = map(_without_limits, (settings, than))
+    if now != earlier or "path_tracing" in now or limits == former:
+        return False
+    return all(limit >= old for limit, old in zip(limits, former, strict=True))
+
+
+def _without_limits(settings: dict[str, Any]) -> tuple[dict[str, Any], list[float]]:
+    """The settings but for how long the run is, and this: steps and seconds, Inf for no limit."""
+    budget = dict(settings.get("budget", {}))
+    limits = [budget.pop(unit, None) for unit in ("steps", "seconds")]
+    rest = {**settings, "budget": budget} if "budget" in settings else settings
+    return rest, [math.inf if limit is None else limit for limit in limits]
+
+
+def _write_json(path: Path, content: dict[str, Any]) -> None:
+    text = json.dumps(content, indent=2, sort_keys=True)
+    write_atomically(path, text.encode())
+
+
+def _flatten(value: Any, prefix: str = "") -> dict[str, Any]:
+    if not isinstance(value, dict):
+        return {prefix: value}
+    return {
+        key: leaf
+        for name, child in value.items()
+        for key, leaf in _flatten(child, f"{prefix}.{name}" if prefix else name).items()
+    }

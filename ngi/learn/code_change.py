@@ -1,0 +1,50 @@
+"""What becomes of a run whose program has changed since it was made or interrupted."""
+
+from __future__ import annotations
+
+import logging
+from typing import Any
+
+from ngi.files import code_versions
+from ngi.files.code_versions import same_program, shown
+from ngi.files.run_folder import RunFolder
+
+log = logging.getLogger(__name__)
+
+ON_CHANGE = ("continue", "refuse", "restart")
+"""What `run.on_code_change` can be."""
+
+
+def heed_code_change(folder: RunFolder, *, on_change: str) -> None:
+    """Does what `run.on_code_change` says where the code is not what the run was made with so far.
+
+    'continue' leaves it at a warning: here for a finished run, for others once they go on (see
+    `record_code_version`). 'restart' lets the folder's `begin` delete what is there. Raises
+    RuntimeError for 'refuse', ValueError for another word.
+    """
+    if on_change not in ON_CHANGE:
+        raise ValueError(f"run.on_code_change: '{on_change}'; expected one of {list(ON_CHANGE)}")
+    earlier, now = _last_version(folder), code_versions.code_version()
+    if earlier is None or same_program(earlier, now):
+        return
+    change = f"{folder.path} was made with {shown(earlier)}, and this is {shown(now)}"
+    if on_change == "refuse":
+        raise RuntimeError(
+            f"{change}; run.on_code_change=continue keeps what is there, run.on_code_change="
+            "restart deletes it and begins afresh, run.folder=… chooses another folder"
+        )
+    if on_change == "restart":
+        log.warning("%s: it begins afresh, and what is there is deleted", change)
+        folder.restarted = True
+    elif folder.result is not None:
+        log.warning("%s: run.on_code_change=restart makes it again", change)
+
+
+def _last_version(folder: RunFolder) -> dict[str, Any] | None:
+    """None where nothing has been made yet; before there was a record, results named a commit."""
+    if not folder.has_something:
+        return None
+    if found := code_versions.code_versions(folder.path):
+        return found[-1]
+    result = folder.result or {}
+    return {key: result[key] for key in ("commit", "dirty")} if "commit" in result else None

@@ -1,0 +1,179 @@
+"""What trackers by other programs have in common: they are called aside, and named alike."""
+
+from __future__ import annotations
+
+import json
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from ngi.evaluate import SETS, Comparison, Evaluation
+from ngi.files.durable import write_atomically
+from ngi.files.row_log import RowLog
+from ngi.files.run_folder import TRACKED
+from ngi.learn.aside import Aside
+from ngi.learn.tracker import Row
+
+FINISH_SECONDS = 60.0
+"""How long a program may take to send what is left at the end of a run."""
+
+LEEWAY_SECONDS = 10.0
+"""How much longer it may take to say so."""
+
+
+class Remote(ABC):
+    """A tracker by another program, which may fail or hang.
+
+    Nothing waits for it but the end of the run, and that not for long. Where it fails, a warning
+    says so once and the run goes on with its own files.
+
+    every: of how many steps one is passed on; steps.csv has all of them
+    Raises ValueError where that is no positive number.
+
+    What it is told goes by the names that these programs put into sections: 'step' and
+    'run_seconds', the two axes; 'train/…' of a step; 'hard/mape', 'uniform/dssim_worst5', … of an
+    evaluation, 'best/hard_mape', … the lowest so far, and 'run/…' for what else it counts.
+    """
+
+    name: str
+    """Of the program."""
+
+    def __init__(self, *, every: int = 1) -> None:
+        if every < 1:
+            raise ValueError(f"tracker.every: {every}; expected at least 1 step")
+        self._every = every
+        self._aside: Aside | None = None
+        self._folder = Path()
+        self._best: dict[str, float] = {}
+
+    def start(self, *, folder: Path, settings: dict[str, Any], label: dict[str, Any]) -> None:
+        self._import()
+        self._folder = folder
+        self._best = {}
+        for row in RowLog(folder / "metrics.csv").rows():
+            self._better(row)
+        self._aside = Aside(
+            self.name,
+            consequence=f"rows are missing there, but all are in the files of {folder}",
+        )
+        self._call(lambda: self._begin(folder, settings, label))
+
+    def step(self, row: Row) -> None:
+        if int(str(row["step"])) % self._every == 0:
+            named = _named(row, lambda key: f"train/{key}")
+            self._call(lambda: self._log(named))
+
+    def evaluated(self, row: Row, evaluation: Evaluation) -> None:
+        self._tell(row)
+        step, comparison = int(str(row["step"])), evaluation.comparison(SETS[0])
+        self._call(lambda: self._show(comparison, step))
+
+    def finish(self, *, failed: bool) -> None:
+        if self._aside is None:
+            return
+        if not failed:
+            self._call(self._keep)
+        self._call(lambda: self._end(failed=failed))
+        self._aside.end(seconds=FINISH_SECONDS + LEEWAY_SECONDS)
+        self._aside = None
+
+    def _call(self, function: Callable[[], None]) -> None:
+        if self._aside is not None:
+            self._aside.call(function)
+
+    def _tell(self, row: Row) -> None:
+        """A row of metrics.csv."""
+        named = {**_named(row, _section), **self._better(row)}
+        self._call(lambda: self._log(named))
+
+    def _better(self, row: Row) -> dict[str, float]:
+        """The lowest of every metric by now, this row's included."""
+        for key, value in _metrics(row).items():
+            self._best[key] = min(value, self._best.get(key, value))
+        return {f"best/{key}": value for key, value in self._best.items()}
+
+    @abstractmethod
+    def _import(self) -> None:
+        """RuntimeError, with what to do, where the program is not installed."""
+
+    # What follows is called aside, in this order; whatever it raises is a warning.
+
+    @abstractmethod
+    def _begin(self, folder: Path, settings: dict[str, Any], label: dict[str, Any]) -> None: ...
+
+    @abstractmethod
+    def _log(self, row: dict[str, float]) -> None:
+        """A row by its names there, without what is empty."""
+
+    @abstractmethod
+    def _show(self, comparison: Comparison, step: int) -> None:
+        """The pictures of an evaluation."""
+
+    @abstractmethod
+    def _keep(self) -> None:
+        """Files of the finished run."""
+
+    @abstractmethod
+    def _end(self, *, failed: bool) -> None: ...
+
+
+def kept_id(folder: Path, tracker: str, make: Callable[[], str]) -> str:
+    """By which a tracker knows the run in this folder, across interruptions; made where missing."""
+    file = folder / TRACKED
+    ids: dict[str, str] = json.loads(file.read_text()) if file.exists() else {}
+    if tracker not in ids:
+        ids[tracker] = make()
+        write_atomically(file, json.dumps(ids, indent=2).encode())
+    return ids[tracker]
+
+
+def nested(
+    label: dict[str, Any], settings: dict[str, Any], options: Mapping[str, Any]
+) -> dict[str, Any]:
+    """The configuration as it is shown: to filter by any option, override or value.
+
+    options: chosen of the groups of conf/, which become columns of their own; Hydra's own are left
+        out. The rest of the settings stands below 'settings', whether it was overridden or not.
+    """
+    chosen = {key: value for key, value in options.items() if "/" not in key}
+    return {**chosen, **{k: label[k] for k in ("seed", "overrides")}, "settings": settings}
+
+
+def group(label: dict[str, Any], options: Mapping[str, Any]) -> str:
+    """Runs that belong together: those of a sweep, an experiment, or else a budget."""
+    return str(options.get("sweeps") or options.get("experiment") or label["budget"])
+
+
+def job_type(label: dict[str, Any]) -> str:
+    """What tells the runs of a sweep apart beside scene and seed: the method."""
+    return str(label["method"] or label["sampler"])
+
+
+def shown_name(label: dict[str, Any]) -> str:
+    """Of a run; several may have the same."""
+    return f"{label['scene']}/{job_type(label)}/{label['seed']}"
+
+
+def _named(row: Row, name: Callable[[str], str]) -> dict[str, float]:
+    """Without what is empty."""
+    axes = ("step", "run_seconds")
+    return {
+        key if key in axes else name(key): value
+        for key, value in row.items()
+        if isinstance(value, int | float)
+    }
+
+
+def _section(key: str) -> str:
+    """'hard_mape' is 'hard/mape', and 'patches_traced' is 'run/patches_traced'."""
+    first, _, rest = key.partition("_")
+    return f"{first}/{rest}" if first in SETS else f"run/{key}"
+
+
+def _metrics(row: Row) -> dict[str, float]:
+    """Those for which less is better, by their names in metrics.csv, without NaN."""
+    given = {k: v for k, v in row.items() if k.partition("_")[0] in SETS and v not in (None, "")}
+    found = {key: float(str(value)) for key, value in given.items()}
+    return {key: value for key, value in found.items() if not math.isnan(value)}

@@ -1,0 +1,1 @@
+"""What this machine has: renderers' backends, memory, energy, precision; where results are made."""

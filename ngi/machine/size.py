@@ -1,0 +1,35 @@
+"""Which size of network suits this machine, and how it begins a run of a given length."""
+
+from __future__ import annotations
+
+SECONDS_PER_BATCH = 15.0
+"""Of the budget, for each batch that is rendered before the first is reused."""
+
+MOST_BATCHES = 4
+"""Rendered before the first is reused, however long the budget."""
+
+
+def network_width() -> int:
+    """Features of a hidden layer: 512 on a GPU (paper, Sec. 4.2), 128 on a processor."""
+    return 512 if _has_gpu() else 128
+
+
+def network_depth() -> int:
+    """Number of hidden layers: 8 on a GPU (paper, Sec. 4.2), 6 on a processor."""
+    return 8 if _has_gpu() else 6
+
+
+def bootstrap_batches(seconds: float | None) -> int:
+    """How many batches are rendered before the first is reused: a share of the budget.
+
+    seconds: of the budget; None for a budget in steps
+    """
+    if seconds is None:
+        return MOST_BATCHES
+    return max(1, min(MOST_BATCHES, int(seconds / SECONDS_PER_BATCH)))
+
+
+def _has_gpu() -> bool:
+    import torch  # resolved from the configuration, which --help shows without PyTorch
+
+    return torch.cuda.is_available()

@@ -1,0 +1,1 @@
+"""Competitors, each whole in one folder: its network, what its samples are, its loss."""

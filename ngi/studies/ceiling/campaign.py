@@ -1,0 +1,155 @@
+"""All runs of a scene, resumable, into one folder."""
+
+from __future__ import annotations
+
+import io
+import json
+from contextlib import closing
+from pathlib import Path
+
+import pandas as pd
+import torch
+from hydra.utils import instantiate
+from omegaconf import DictConfig
+from torch import Tensor
+from tqdm import tqdm
+
+from ngi.config.build import build_samples, plain
+from ngi.evaluate import Evaluator
+from ngi.files.durable import write_atomically, write_tensors
+from ngi.learn import Samples
+from ngi.machine.memory import keep_freed_memory
+from ngi.machine.provenance import provenance
+from ngi.reuse import CompactPatches
+from ngi.studies.ceiling.pool import chosen, render_pool
+from ngi.studies.ceiling.runs import CHUNK, Run, do, measured, plan
+from ngi.studies.ceiling.training import Training
+
+TABLE, PROVENANCE, TEACHER = "ceiling.csv", "provenance.json", "teacher.pt"
+
+TEACHER_SEED = 1000
+"""Of the network that stands in for the truth; no run has it."""
+
+
+def run_all(config: DictConfig) -> Path:
+    """Does the runs that the folder does not hold yet; the path of the table of all of them.
+
+    Raises ValueError for a folder whose runs were made with another scene or configuration.
+    """
+    study, folder = config.ceiling, Path(config.run.folder)
+    keep_freed_memory()
+    with closing(instantiate(config.renderer)) as renderer:
+        _claim(folder, config, scene=renderer.scene_hash, backend=renderer.description)
+        samples = build_samples(config, renderer=renderer)
+        evaluator = instantiate(config.evaluation.evaluator)(
+            renderer=renderer, test_inputs=samples.test_inputs
+        )
+        evaluator.prepare()
+        pool = render_pool(
+            folder / "pool",
+            samples=samples,
+            sampler=instantiate(config.sampler),
+            resolution=instantiate(config.resolution).resolution(0),
+            count=study.pool,
+        )
+    truth = _truth(config, samples, pool, evaluator, folder)
+    runs = list(
+        plan(
+            pool=study.pool,
+            patches=study.patches,
+            steps=study.steps,
+            choices=list(study.choices),
+            seeds=study.seeds,
+        )
+    )
+    for run in tqdm(runs, desc="runs", unit="run"):
+        if not _file(folder, run).exists():
+            training = Training(
+                config, samples=samples, seed=run.seed, steps=run.steps, folder=folder
+            )
+            row = do(
+                run,
+                training,
+                pool=pool,
+                truth=truth,
+                choice=instantiate(study.choices[run.choice]),
+                rounds=study.rounds,
+                evaluator=evaluator,
+            )
+            _write(_file(folder, run), pd.DataFrame([{"scene": config.scene.name, **row}]))
+    table = pd.concat([pd.read_csv(_file(folder, run)) for run in runs], ignore_index=True)
+    _write(folder / TABLE, table)
+    return folder / TABLE
+
+
+def _truth(
+    config: DictConfig,
+    samples: Samples,
+    pool: CompactPatches,
+    evaluator: Evaluator,
+    folder: Path,
+) -> Tensor:
+    """[m, h, w, 3]: what a network of the same kind answers that was trained long on all patches.
+
+    Its own errors are written beside it.
+    """
+    file = folder / TEACHER
+    if not file.exists():
+        steps = config.ceiling.teacher_steps
+        teacher = Training(config, samples=samples, seed=TEACHER_SEED, steps=steps, folder=folder)
+        for part in torch.arange(len(pool)).split(CHUNK):
+            teacher.add(chosen(pool, part), torch.ones(len(part), dtype=torch.float64))
+        for _ in tqdm(range(steps), desc="teacher", unit="step"):
+            teacher.train(1)
+        errors = measured(evaluator.evaluate(teacher.predict))
+        write_atomically(folder / "teacher.json", json.dumps(errors, indent=1).encode())
+        parts = torch.arange(len(pool)).split(CHUNK)
+        write_tensors(
+            file, {"answers": torch.cat([teacher.answers(chosen(pool, part)) for part in parts])}
+        )
+    answers: Tensor = torch.load(file, weights_only=True)["answers"]
+    return answers
+
+
+def _file(folder: Path, run: Run) -> Path:
+    return folder / "runs" / f"{run.name}.csv"
+
+
+def _write(file: Path, table: pd.DataFrame) -> None:
+    stream = io.StringIO()
+    table.to_csv(stream, index=False)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    write_atomically(file, stream.getvalue().encode())
+
+
+PARTS = (
+    *("data", "sampler", "reuse", "resolution", "model", "loss", "optimizer", "schedule"),
+    *("averaging", "trainer", "renderer"),
+)
+"""Of the configuration, that decide what a run of the study gives."""
+
+IN_EVERY_RUN = ("pool", "rounds", "teacher_steps")
+"""Of the study's own; how many runs there are may change."""
+
+
+def _claim(folder: Path, config: DictConfig, *, scene: str, backend: str) -> None:
+    """Writes the folder's provenance, or compares it with what its runs were made with."""
+    study = plain(config.ceiling)
+    made_with = {
+        "scene": scene,
+        "study": {key: study[key] for key in IN_EVERY_RUN},
+        "configuration": {part: plain(config[part]) for part in PARTS},
+    }
+    file = folder / PROVENANCE
+    if not file.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        content = {**provenance(backend=backend), **made_with}
+        write_atomically(file, json.dumps(content, indent=1).encode())
+        return
+    found = json.loads(file.read_text())
+    for key, value in made_with.items():
+        if found[key] != json.loads(json.dumps(value)):
+            raise ValueError(
+                f"{file}: the runs in this folder were made with another {key} than now; give "
+                "another run.folder, or move the folder away"
+            )

@@ -1,0 +1,125 @@
+"""One run of the study: patches come in rounds, and a rule says which."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
+
+import torch
+from torch import Tensor
+
+from ngi.evaluate import METRICS, SETS, Evaluation, Evaluator
+from ngi.explore import Importance
+from ngi.reuse import CompactPatches
+from ngi.studies.ceiling.pool import chosen
+from ngi.studies.ceiling.training import Training
+
+TAIL = 0.05
+"""Part of a set's pixels, those of the largest error, that make its tail."""
+
+CHUNK = 512
+"""Candidates that the network is asked about at once."""
+
+
+class Run(NamedTuple):
+    """patches: in all; steps: in all; choice: a name in `ceiling.choices`; seed: of weights too."""
+
+    patches: int
+    steps: int
+    choice: str
+    seed: int
+
+    @property
+    def name(self) -> str:
+        """For a file."""
+        return f"patches={self.patches},steps={self.steps},{self.choice},seed={self.seed}"
+
+
+def plan(
+    *, pool: int, patches: Sequence[int], steps: Sequence[int], choices: Sequence[str], seeds: int
+) -> Iterator[Run]:
+    """All runs, the first seed of all of them first; with the whole pool there is no choice."""
+    for seed in range(seeds):
+        for of_steps in steps:
+            for of_patches in (*patches, pool):
+                for choice in choices if of_patches < pool else choices[:1]:
+                    yield Run(of_patches, of_steps, choice, seed)
+
+
+def do(
+    run: Run,
+    training: Training,
+    *,
+    pool: CompactPatches,
+    truth: Tensor,
+    choice: Importance,
+    rounds: int,
+    evaluator: Evaluator,
+) -> dict[str, Any]:
+    """Trains, and gives the run's row: itself, and the errors of its end.
+
+    Patches come in `rounds` rounds, evenly over the steps. The first is drawn uniformly, for an
+    untrained network has nothing to say, and is the same for all choices of a seed; the others by
+    the true errors of all patches not yet chosen.
+
+    truth: [m, h, w, 3] log1p radiance of the pool, see `Training.answers`
+    """
+    generator = torch.Generator().manual_seed(run.seed)
+    left = torch.ones(len(pool), dtype=torch.bool)
+    for number in range(rounds):
+        candidates = left.nonzero().flatten()
+        count = _part(run.patches, number, rounds)
+        if number == 0 or choice.uniform_share == 1:
+            drawn = torch.randperm(len(candidates), generator=generator)[:count]
+            weights = torch.ones(count, dtype=torch.float64)
+        else:
+            errors = true_errors(training, pool, truth, candidates)
+            drawn, weights = choice.draw(errors, count, generator)
+        training.add(chosen(pool, candidates[drawn]), weights)
+        left[candidates[drawn]] = False
+        training.train(_part(run.steps, number, rounds))
+    return {**run._asdict(), **measured(evaluator.evaluate(training.predict))}
+
+
+def true_errors(
+    training: Training, pool: CompactPatches, truth: Tensor, candidates: Tensor
+) -> Tensor:
+    """[n] of the patches with these indices, under the averaged weights."""
+    parts = candidates.split(CHUNK)
+    return torch.cat([training.errors(chosen(pool, part), truth[part]) for part in parts])
+
+
+def measured(evaluation: Evaluation) -> dict[str, float]:
+    """Per set: every metric, their geometric mean as `SET_error`, and `SET_tail`.
+
+    The tail is the mean absolute difference of log1p radiance over the worst 5 % of all pixels.
+    """
+    row = evaluation.row()
+    result: dict[str, float] = {}
+    for name in SETS:
+        values = {metric: row[f"{name}_{metric}"] for metric in METRICS}
+        known = [float(value) for value in values.values() if value is not None]
+        result |= {f"{name}_{metric}": float(v) for metric, v in values.items() if v is not None}
+        result[f"{name}_error"] = math.exp(sum(math.log(value) for value in known) / len(known))
+        result[f"{name}_tail"] = _tail(evaluation, name)
+    return result
+
+
+def _tail(evaluation: Evaluation, name: str) -> float:
+    log: Callable[[Tensor], Tensor] = lambda radiance: radiance.clamp(min=0).log1p()  # noqa: E731
+    errors = torch.cat(
+        [
+            (log(prediction) - log(reference.radiance)).abs().mean(dim=-1).flatten()
+            for frame, prediction, reference in zip(
+                evaluation.frames, evaluation.predictions, evaluation.references, strict=True
+            )
+            if frame.set == name
+        ]
+    )
+    return errors.topk(math.ceil(TAIL * len(errors))).values.mean().item()
+
+
+def _part(whole: int, number: int, parts: int) -> int:
+    """The share of part `number` of so many nearly equal ones."""
+    return whole * (number + 1) // parts - whole * number // parts

@@ -1,0 +1,108 @@
+"""Training as `ngi train` does it, step by step, on patches that are given as it goes on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import torch
+from hydra.utils import instantiate
+from omegaconf import DictConfig
+from torch import Tensor
+
+from ngi import learn
+from ngi.config.build import build_module
+from ngi.explore import ConstantTarget
+from ngi.learn import Batch
+from ngi.patches import Patches
+
+PIXELS_APART = 4
+"""Of a candidate's pixels that its error is the mean over: one in 16."""
+
+
+class Training:
+    """Network, optimiser and store of one run with a number of steps known beforehand.
+
+    config: of a run; its model, loss, optimiser, schedule, averaging, reuse and trainer count
+    folder: for the step guard's report; Lightning writes nothing into it
+    """
+
+    def __init__(
+        self, config: DictConfig, *, samples: learn.Samples, seed: int, steps: int, folder: Path
+    ) -> None:
+        config = config.copy()
+        config.seed = seed
+        self.steps = steps
+        self._taken = 0
+        self._count = config.sampler.chains
+        self._generator = torch.Generator().manual_seed(seed)
+        self._store = instantiate(config.reuse.store)(layout=samples.layout)
+        self._weights = torch.zeros(0, dtype=torch.float64)  # by id
+        self._schedule = instantiate(config.schedule)
+        stream: Any = _Answered()
+        self._module = build_module(config, samples=samples, stream=stream, folder=folder)
+        self._module.trainer = instantiate(config.trainer)(default_root_dir=folder, max_steps=1)
+        self._optimizer = self._module.configure_optimizers()
+        self._rates = [group["lr"] for group in self._optimizer.param_groups]
+        self._samples = samples
+        self.predict = self._module.predict
+
+    def add(self, patches: Patches, weights: Tensor) -> None:
+        """Patches [n] that are trained on from now on, and their losses' factors [n]."""
+        self._store.add(patches)
+        self._weights = torch.cat([self._weights, weights])
+
+    def train(self, steps: int) -> None:
+        """Takes so many steps on stored patches. FloatingPointError where they lead nowhere."""
+        for _ in range(steps):
+            ids = self._store.draw(self._count, self._generator)
+            batch = Batch(
+                self._store.get(ids),
+                ids,
+                generated=False,
+                current=None,
+                loss_weights=self._weights[ids].float(),
+            )
+            self._step(batch)
+
+    def errors(self, patches: Patches, truth: Tensor) -> Tensor:
+        """[n] mean absolute differences of log1p radiance between prediction and `truth`.
+
+        truth: [n, h, w, 3], at the pixels of `answers`
+        """
+        return (self.answers(patches) - truth).abs().mean(dim=(1, 2, 3))
+
+    def answers(self, patches: Patches) -> Tensor:
+        """[n, h, w, 3] log1p radiance by the averaged weights, at every fourth row and column."""
+        (buffers, vectors), _ = self._samples.example(patches)
+        averaged = self._module.averaged
+        network = self._module.network if averaged is None else averaged.module
+        sparse = buffers[:, ::PIXELS_APART, ::PIXELS_APART].contiguous()
+        with torch.no_grad(), self._module.trainer.precision_plugin.forward_context():
+            answer: Tensor = network(sparse, vectors)
+        return answer.float()
+
+    def _step(self, batch: Batch) -> None:
+        factor = self._schedule.factor(steps=self._taken, used=self._taken / self.steps)
+        for group, rate in zip(self._optimizer.param_groups, self._rates, strict=True):
+            group["lr"] = rate * factor
+        learn.training_step(
+            batch,
+            self._module.learner,
+            optimizer=self._optimizer,
+            precision=self._module.trainer.precision_plugin.forward_context,
+        )
+        self._taken += 1
+
+
+class _Answered:
+    """In a stream's place, where no chains learn from the steps."""
+
+    def __init__(self) -> None:
+        self.sampler = SimpleNamespace(target=ConstantTarget())
+        self.clock = learn.PhaseClock()
+        self.counters = learn.Counters()
+
+    def feedback(self, _: learn.Feedback) -> None:
+        self.counters.iteration += 1

@@ -1,0 +1,50 @@
+"""Entry point: `python -m ngi.exploration_map --help`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Runs the map; returns the exit status."""
+    parser = argparse.ArgumentParser(
+        prog="python -m ngi.exploration_map",
+        description="When does exploration pay? Trains every sampler, target and acceptance rule, "
+        "with and without reuse, on closed-form scenes with a knob for each cause, and writes "
+        "exploration_map.csv. Goes on where it was interrupted. "
+        "`python -m analysis.exploration_map FOLDER` draws the map.",
+    )
+    parser.add_argument(
+        "--output", metavar="FOLDER", type=Path, default=Path("outputs/exploration-map")
+    )
+    parser.add_argument(
+        "--settings", choices=("smoke", "full"), default="full", help="default: full"
+    )
+    parser.add_argument("--seeds", type=int, nargs="+", default=[0, 1, 2, 3, 4], metavar="SEED")
+    parser.add_argument(
+        "--jobs", type=int, default=2, help="processes, one thread each (default: 2)"
+    )
+    arguments = parser.parse_args(argv)
+
+    from ngi.studies.exploration_map.campaign import run_all  # PyTorch takes seconds
+    from ngi.studies.exploration_map.plan import PLANS
+
+    try:
+        table = run_all(
+            PLANS[arguments.settings],
+            seeds=arguments.seeds,
+            folder=arguments.output,
+            jobs=arguments.jobs,
+        )
+    except (ValueError, OSError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    print(f"Written: {table}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

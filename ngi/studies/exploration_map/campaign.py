@@ -1,0 +1,117 @@
+"""All runs of a plan: in processes, resumable, into one folder."""
+
+from __future__ import annotations
+
+import io
+import json
+import multiprocessing
+from collections.abc import Iterable, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pandas as pd
+import torch
+from tqdm import tqdm
+
+from ngi.files.durable import write_atomically
+from ngi.machine.memory import keep_freed_memory
+from ngi.machine.provenance import provenance
+from ngi.render import PocketRenderer
+from ngi.studies.exploration_map.plan import BASE, Plan
+from ngi.studies.exploration_map.setting import METHODS, Method, Setting
+from ngi.studies.exploration_map.training import plain_configuration, train
+
+TABLE, PROVENANCE = "exploration_map.csv", "provenance.json"
+
+
+class Run(NamedTuple):
+    setting: Setting
+    method: Method
+    seed: int
+
+    def file(self, folder: Path) -> Path:
+        """Where its rows are, once it is finished."""
+        return folder / "runs" / self.setting.name / f"{self.method.name}-seed={self.seed}.csv"
+
+
+def run_all(plan: Plan, *, seeds: Sequence[int], folder: Path, jobs: int) -> Path:
+    """Does the runs that `folder` does not hold yet, and writes the table of all of them.
+
+    The first seed of every setting comes first, so that an interrupted map is a whole one of fewer
+    seeds. Returns the table's path: a row per evaluation, the columns of `training.train`.
+    Raises ValueError for a folder with runs of another size or configuration.
+    """
+    _claim(folder, plan)
+    runs = [
+        Run(setting, method, seed)
+        for seed in seeds
+        for setting in plan.settings
+        for method in METHODS
+    ]
+    _do([run for run in runs if not run.file(folder).exists()], plan, folder, jobs, len(runs))
+    table = pd.concat([pd.read_csv(run.file(folder)) for run in runs], ignore_index=True)
+    _write_csv(folder / TABLE, table)
+    return folder / TABLE
+
+
+def _do(runs: Sequence[Run], plan: Plan, folder: Path, jobs: int, total: int) -> None:
+    work = partial(_run_to_file, plan=plan, folder=folder)
+    context = multiprocessing.get_context("spawn")  # forked PyTorch may hang
+    with (
+        ProcessPoolExecutor(jobs, mp_context=context, initializer=_prepare_process) as pool,
+        tqdm(total=total, initial=total - len(runs), unit="run", mininterval=5) as bar,
+    ):
+        futures = [pool.submit(work, run) for run in runs]
+        try:
+            _wait(futures, bar)
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def _wait(futures: Iterable[Future[None]], bar: tqdm[Any]) -> None:
+    for future in as_completed(futures):
+        future.result()
+        bar.update()
+
+
+def _prepare_process() -> None:
+    torch.set_num_threads(1)  # the networks are small, and the other cores have their own runs
+    keep_freed_memory()
+
+
+def _run_to_file(run: Run, *, plan: Plan, folder: Path) -> None:
+    file = run.file(folder)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    _write_csv(file, pd.DataFrame(train(*run, plan)))
+
+
+def _write_csv(file: Path, table: pd.DataFrame) -> None:
+    stream = io.StringIO()
+    table.to_csv(stream, index=False)
+    write_atomically(file, stream.getvalue().encode())
+
+
+def _claim(folder: Path, plan: Plan) -> None:
+    """Writes the folder's provenance, or compares it with what its runs were made with."""
+    size = {"steps": plan.steps, "evaluations": plan.evaluations, "frames": plan.frames}
+    made_with = {
+        "size": size,
+        "scene": PocketRenderer(**BASE.scene, patch_size=1).scene_hash,
+        "configuration": {method.name: plain_configuration(method) for method in METHODS},
+    }
+    file = folder / PROVENANCE
+    if file.exists():
+        found = json.loads(file.read_text())
+        for key, value in made_with.items():
+            if found[key] != value:
+                raise ValueError(
+                    f"{file}: the runs in this folder were made with another {key} than now; "
+                    "choose another --output, or move the folder away"
+                )
+        return
+    folder.mkdir(parents=True, exist_ok=True)
+    content = {**provenance(backend=PocketRenderer.description), **made_with}
+    write_atomically(file, json.dumps(content, indent=1).encode())

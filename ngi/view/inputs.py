@@ -1,0 +1,154 @@
+"""What a browser is given for each part of v: a slider, a switch, a menu, or a colour picker."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import viser
+
+from ngi.scene import srgb
+from ngi.scene.kinds import Visibility
+from ngi.view.controls import Control
+
+STEPS = 500
+"""Of a slider from one end to the other, at least."""
+
+
+class Input(ABC):
+    """Shows some components of v, and says what they are once a user has changed it."""
+
+    @property
+    @abstractmethod
+    def group(self) -> str:
+        """The objects that follow it."""
+
+    @abstractmethod
+    def shown(self, v: Sequence[float]) -> Any:
+        """The value that stands for v, of length D."""
+
+    @abstractmethod
+    def components(self, value: Any) -> dict[int, float]:
+        """Components by their index in v that a value stands for."""
+
+    @abstractmethod
+    def add(self, gui: viser.GuiApi, v: Sequence[float]) -> Any:
+        """Puts it on a page; the handle has a `value` and `on_update`."""
+
+
+@dataclass(frozen=True)
+class _One(Input):
+    control: Control
+
+    @property
+    def group(self) -> str:
+        return self.control.group
+
+
+class Slider(_One):
+    """A number, whose range is said on hover: below the slider its handle would cover it."""
+
+    def shown(self, v: Sequence[float]) -> float:
+        value = self.control.value(v[self.control.component])
+        return min(max(round(value, self._digits), self.control.low), self.control.high)
+
+    def components(self, value: float) -> dict[int, float]:
+        return {self.control.component: self.control.of_value(value)}
+
+    def add(self, gui: viser.GuiApi, v: Sequence[float]) -> Any:
+        name, low, high = self.control.name, self.control.low, self.control.high
+        step = 10.0**-self._digits
+        hint = f"from {low:g} to {high:g}"
+        return gui.add_slider(name, low, high, step, self.shown(v), marks=(), hint=hint)
+
+    @property
+    def _digits(self) -> int:
+        """After the decimal point, so that a slider has at least `STEPS` values."""
+        return -math.floor(math.log10((self.control.high - self.control.low) / STEPS))
+
+
+class Switch(_One):
+    """There or not."""
+
+    def shown(self, v: Sequence[float]) -> bool:
+        return self.control.choice(v[self.control.component]) == self.control.choices[1]
+
+    def components(self, value: bool) -> dict[int, float]:
+        return {self.control.component: self.control.of_choice(self.control.choices[value])}
+
+    def add(self, gui: viser.GuiApi, v: Sequence[float]) -> Any:
+        return gui.add_checkbox(self.control.name, self.shown(v))
+
+
+class Menu(_One):
+    """One of several."""
+
+    def shown(self, v: Sequence[float]) -> str:
+        return self.control.choice(v[self.control.component])
+
+    def components(self, value: str) -> dict[int, float]:
+        return {self.control.component: self.control.of_choice(value)}
+
+    def add(self, gui: viser.GuiApi, v: Sequence[float]) -> Any:
+        choices = self.control.choices
+        return gui.add_dropdown(self.control.name, choices, initial_value=self.shown(v))
+
+
+@dataclass(frozen=True)
+class Picker(Input):
+    """A colour of three components; of a light, relative to the brightest that it can have.
+
+    A colour out of the range is brought into it, channel by channel.
+    """
+
+    red: Control
+    green: Control
+    blue: Control
+
+    @property
+    def group(self) -> str:
+        return self.red.group
+
+    def shown(self, v: Sequence[float]) -> tuple[int, ...]:
+        linear = [control.value(v[control.component]) for control in self._channels]
+        return tuple(
+            np.rint(255 * srgb.encoded(np.array(linear) / self._white)).astype(int).tolist()
+        )
+
+    def components(self, value: Sequence[int]) -> dict[int, float]:
+        linear = self._white * srgb.decoded(np.array(value) / 255)
+        channels = zip(self._channels, linear.tolist(), strict=True)
+        return {control.component: control.of_value(number) for control, number in channels}
+
+    def add(self, gui: viser.GuiApi, v: Sequence[float]) -> Any:
+        name = self.red.name.rpartition(" ")[0]
+        ranges = dict.fromkeys(f"{c.low:g} to {c.high:g}" for c in self._channels)
+        hint = f"linear r, g, b from {', '.join(ranges)}"
+        return gui.add_rgb(name, self.shown(v), hint=hint)  # type: ignore[arg-type]
+
+    @property
+    def _channels(self) -> tuple[Control, Control, Control]:
+        return self.red, self.green, self.blue
+
+    @property
+    def _white(self) -> float:
+        """What the brightest colour of a screen stands for."""
+        return max(1.0, *(control.high for control in self._channels))
+
+
+def inputs(controls: Sequence[Control]) -> Iterator[Input]:
+    """In the order of v; one for the three components of a colour."""
+    rest = iter(controls)
+    for control in rest:
+        if control.of_colour:
+            yield Picker(control, next(rest), next(rest))
+        elif control.choices == Visibility.choices:
+            yield Switch(control)
+        elif control.choices:
+            yield Menu(control)
+        else:
+            yield Slider(control)

@@ -1,0 +1,79 @@
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from scipy import stats
+
+from analysis.ceiling import EVERYWHERE, NO_CHOICE, differences, main, read_runs
+
+HEADER = "scene,patches,steps,choice,seed,hard_error,uniform_error,hard_tail\n"
+
+
+def write(folder: Path, *rows: str) -> None:
+    """A file per run, as the study leaves them."""
+    for number, row in enumerate(rows):
+        file = folder / row.split(",")[0] / "runs" / f"{number}.csv"
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(HEADER + row + "\n")
+
+
+def study(folder: Path) -> None:
+    write(
+        folder,
+        "room,64,400,uniform,0,0.10,0.2,0.3",
+        "room,64,400,uniform,1,0.20,0.2,0.3",
+        "room,64,400,oracle,0,0.09,0.2,0.3",
+        "room,64,400,oracle,1,0.16,0.2,0.3",
+        "room,1024,400,uniform,0,0.05,0.1,0.3",
+        "room,1024,400,uniform,1,0.08,0.1,0.3",
+        "egg,64,400,uniform,0,0.10,0.2,0.3",
+        "egg,64,400,oracle,0,0.11,0.2,0.3",
+    )
+
+
+def only(found: pd.DataFrame, **values: object) -> pd.Series:
+    for name, value in values.items():
+        found = found[found[name] == value]
+    (row,) = [row for _, row in found.iterrows()]
+    return row
+
+
+def test_differences_are_paired_by_seed(tmp_path: Path) -> None:
+    study(tmp_path)
+    found = differences(read_runs(tmp_path))
+    row = only(found, scene="room", choice="oracle", error="hard_error")
+    assert row["difference"] == pytest.approx((-0.1 - 0.2) / 2)
+    spread = stats.ttest_1samp([-0.1, -0.2], 0).confidence_interval()
+    assert row["half_width"] == pytest.approx((spread.high - spread.low) / 2)
+    assert row["uniform"] == pytest.approx(0.15)
+    everything = only(found, scene="room", choice=NO_CHOICE, error="hard_error")
+    assert everything["difference"] == pytest.approx((-0.5 - 0.6) / 2)
+
+
+def test_all_scenes_together_have_a_pair_per_scene_and_seed(tmp_path: Path) -> None:
+    study(tmp_path)
+    found = differences(read_runs(tmp_path))
+    row = only(found, scene=EVERYWHERE, choice="oracle", error="hard_error")
+    assert (row["difference"], row["seeds"]) == (pytest.approx((-0.1 - 0.2 + 0.1) / 3), 3)
+
+
+def test_a_study_that_is_not_finished_is_read_as_far_as_it_is(tmp_path: Path) -> None:
+    study(tmp_path)
+    row = only(differences(read_runs(tmp_path)), scene="egg", error="hard_error")
+    assert (row["choice"], row["seeds"]) == ("oracle", 1)
+    assert row["difference"] == pytest.approx(0.1)
+    assert pd.isna(row["half_width"])
+
+
+def test_tables_say_how_many_seeds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    study(tmp_path)
+    assert main([str(tmp_path), "--output", str(tmp_path / "out")]) == 0
+    text = (tmp_path / "out" / "tables.md").read_text()
+    assert "-15.0 ± 63.5 % (2)" in text
+    assert text.strip() in capsys.readouterr().out
+    assert len(pd.read_csv(tmp_path / "out" / "runs.csv")) == 8
+
+
+def test_an_empty_folder_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([str(tmp_path)]) == 1
+    assert "no runs" in capsys.readouterr().err

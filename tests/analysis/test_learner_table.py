@@ -1,0 +1,80 @@
+"""README.md and docs/learner show the numbers of docs/learner/results.csv."""
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from analysis.learner_table import (
+    ABLATION,
+    BEGIN,
+    END,
+    PAGES,
+    RESULTS,
+    learner_table,
+    parts_table,
+    with_parts,
+    written,
+)
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=str)
+def test_the_pages_have_the_numbers_of_the_results(page: Path) -> None:
+    text = (ROOT / page).read_text()
+    assert text == written(text, pd.read_csv(ROOT / RESULTS), page), (
+        "python -m analysis.learner_table writes it"
+    )
+
+
+def test_the_page_has_the_numbers_of_the_ablation() -> None:
+    text = (ROOT / "docs/learner/README.md").read_text()
+    assert text == with_parts(text, pd.read_csv(ROOT / ABLATION)), (
+        "python -m analysis.learner_table writes it"
+    )
+
+
+def test_parts_are_compared_with_the_whole_that_they_belong_to() -> None:
+    rows = [
+        {"scene": s, "method": m, "hard_mape": e, "hard_dssim": e, "hard_mae": e, "hard_lpips": e}
+        for s, m, e in (
+            ("box", "ours", 0.1),
+            ("box", "active_exploration", 0.4),
+            ("box", "ours_without/big_steps", 0.12),
+            ("box", "paper_with/big_steps", 0.3),
+            ("box", "paper_with/more", 0.5),
+            ("half", "ours", 0.1),
+        )
+    ]
+    rows[0] |= {"hard_mape": 0.2, "hard_dssim": 0.05}  # the same geometric mean
+    assert parts_table(pd.DataFrame(rows)).splitlines()[2:] == [
+        "| box | *the whole method* | **0.1000** |  | **0.4000** |  |",
+        "| box | big steps | 0.1200 | +20% | 0.3000 | -25% |",
+        "| box | more |  |  | 0.5000 | +25% |",
+    ]
+
+
+def results(**errors: tuple[float, float]) -> pd.DataFrame:
+    rows = [
+        {"scene": "box", "method": m, "seeds": "0 1", "hard_mape": e[0], "hard_mae": e[1]}
+        for m, e in errors.items()
+    ]
+    other = {"scene": "alone", "method": "ours", "seeds": 0, "hard_mape": 1.0, "hard_mae": 1.0}
+    return pd.DataFrame([*rows, other])
+
+
+def test_the_lowest_error_of_each_metric_is_bold_and_ties_are() -> None:
+    table = learner_table(
+        results(ours=(0.1, 0.2004), active_exploration=(0.3, 0.2)),
+        ("mape", "mae"),
+        ("ours", "active_exploration"),
+    )
+    assert table.splitlines()[2:] == ["| box | 2 | **0.100** / **0.200** | 0.300 / **0.200** |"]
+
+
+def test_a_page_without_its_place_is_refused() -> None:
+    with pytest.raises(ValueError, match="put the lines"):
+        written("nothing", results(ours=(1, 1)), Path("README.md"))
+    page = f"a\n{BEGIN}\nold\n{END}\nb"
+    assert "old" not in written(page, results(ours=(1, 1)), Path("README.md"))

@@ -1,0 +1,81 @@
+"""What the words of a command line become before Hydra reads them."""
+
+from pathlib import Path
+
+import pytest
+
+from ngi.config.command_words import completed, with_overrides
+from tests.learn.command_line import run
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ("scene=mirror", "budget=machine method=ours scene=mirror"),
+        ("scene=x budget.seconds=60", "budget=machine method=ours scene=x budget.seconds=60"),
+        ("--cfg job", "--cfg job budget=machine method=ours"),
+        ("-m sampler=uniform,sobol", "-m budget=machine method=ours sampler=uniform,sobol"),
+        ("budget=machine", "method=ours budget=machine"),
+        ("budget=machine method=uniform", "budget=machine method=uniform"),
+    ],
+)
+def test_ours_is_trained_where_the_words_leave_it_open(words: str, expected: str) -> None:
+    assert completed(words.split()) == expected.split()
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "budget=paper",
+        "budget=small scene=mirror",
+        "budget=seconds budget.seconds=60",
+        "method=active_exploration",
+        "experiment=demo",
+        "-m +sweeps=same_time",
+        "+path_tracing=oidn",
+        "++method=uniform",
+        "-m budget=small,paper",
+    ],
+)
+def test_what_is_named_is_taken_at_its_word(words: str) -> None:
+    assert completed(words.split()) == words.split()
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ("", "x=1"),
+        ("--help", "--help x=1"),
+        ("a=b c=d", "x=1 a=b c=d"),
+        ("-m +sweeps=s budget=small", "-m x=1 +sweeps=s budget=small"),
+        ("--config-dir conf a=b -m", "--config-dir conf x=1 a=b -m"),
+        ("--config-dir=conf a=b", "--config-dir=conf x=1 a=b"),
+    ],
+)
+def test_further_overrides_stand_with_the_users(words: str, expected: str) -> None:
+    assert with_overrides(words.split(), "x=1") == expected.split()
+
+
+TINY = (
+    "renderer=analytic",
+    "~renderer.direct",
+    "evaluation=smoke",
+    "model.hidden_features=16",
+    "budget.seconds=2",
+)
+
+
+def test_a_bare_command_trains_ours_and_says_what_that_is(tmp_path: Path) -> None:
+    status, output = run(tmp_path, *TINY, base=())
+    assert status == 0, output
+    assert "ours; 2 s on" in output
+    assert "encoded_generator of 6 x 16 features; 8 patches of 32 x 32 pixels a step" in output
+    assert "1 new batches before the first is reused" in output
+    assert len(list(tmp_path.glob("outputs/machine/*/*/seed=0/result.json"))) == 1
+
+
+def test_a_run_that_ends_within_its_bootstrap_says_so(tmp_path: Path) -> None:
+    status, output = run(tmp_path, "reuse.policy.bootstrap_batches=20", "budget.steps=3")
+    assert status == 0, output
+    assert "each of the 3 steps waited for new patches" in output
+    assert "reuse.policy.bootstrap_batches=20" in output

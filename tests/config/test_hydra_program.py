@@ -1,0 +1,108 @@
+"""What is wrong with a command is said once, with the nearest of what there is."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from hydra.errors import HydraException
+
+from ngi.config.configuration import composed
+from ngi.config.hydra_program import explained
+from tests.learn.command_line import SMALL, environment, run
+
+
+def started(module: str, *words: str, folder: Path) -> tuple[int, str]:
+    done = subprocess.run(
+        [sys.executable, "-m", module, *words],
+        cwd=folder,
+        env=environment(folder),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+    return done.returncode, done.stdout
+
+
+@pytest.mark.parametrize(
+    ("word", "message"),
+    [
+        (
+            "model.hidden_feature=64",
+            "model.hidden_feature: there is no such key; did you mean 'model.hidden_features'?",
+        ),
+        ("modl.hidden_features=3", "modl: there is no such key; did you mean 'model'?"),
+        (
+            "hidden_features=3",
+            "hidden_features: there is no such key; did you mean 'model.hidden_features'?",
+        ),
+        ("lr=3", "lr: there is no such key; did you mean 'optimizer.lr'?"),
+        ("smapler=uniform", "smapler: there is no such key; did you mean 'sampler'?"),
+        (
+            "renderer.noise=3",
+            "renderer.noise: there is no such key; there are renderer.dimensions, "
+            "renderer.patch_size (+renderer.noise=… adds one)",
+        ),
+        (
+            "optimizer=adm",
+            "optimizer/adm: there is no such option; optimizer can be adam, adam_exploration_map, "
+            "adam_small, adam_tuned, muon; did you mean 'adam'?",
+        ),
+        ("+sweeps=xyz", "sweeps/xyz: there is no such option; sweeps can be acceptance, anf, "),
+        ("seed", "Error parsing override 'seed'"),
+    ],
+)
+def test_of_what_does_not_exist_the_nearest_is_named(word: str, message: str) -> None:
+    with pytest.raises(HydraException) as raised:
+        composed("renderer=analytic", word)
+    assert message in explained(raised.value)
+
+
+@pytest.mark.parametrize("module", ["ngi.train", "ngi.costs", "ngi.studies.noise"])
+def test_a_mistyped_key_is_said_in_one_line_and_leaves_nothing(module: str, tmp_path: Path) -> None:
+    words = ("renderer=analytic", "budget=smoke", "model.hidden_feature=64")
+    status, output = started(module, *words, folder=tmp_path)
+    assert status == 1
+    assert output == (
+        "model.hidden_feature: there is no such key; did you mean 'model.hidden_features'?\n"
+    )
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("tracker=wandb", "tracker.mode=maybe"), "tracker.mode: 'maybe'"),
+        (("model._target_=nowhere.Network",), "Error loading 'nowhere.Network'"),
+    ],
+)
+def test_an_error_of_a_run_is_said_once_and_kept_where_the_run_is(
+    words: tuple[str, ...], message: str, tmp_path: Path
+) -> None:
+    status, output = run(tmp_path, *words, "run.folder=here/run")
+    assert status == 1
+    (line,) = [line for line in output.splitlines() if message in line]
+    assert "Error executing" not in output
+    assert "Traceback" not in output
+    assert "full_key" not in output
+    assert line in (tmp_path / "here" / "run" / "train.log").read_text()
+    assert [path.name for path in tmp_path.rglob("train.log")] == ["train.log"]
+    assert not (tmp_path / "outputs").exists()
+
+
+def test_an_error_of_what_is_measured_is_said_once(tmp_path: Path) -> None:
+    status, output = started("ngi.costs", *SMALL, "seed=maybe", folder=tmp_path)
+    assert status == 1
+    assert output.count("seed: 'maybe' is not an integer") == 1
+
+
+def test_jobs_of_a_sweep_write_where_their_folder_is(tmp_path: Path) -> None:
+    words = ("seed=maybe,never", "run.folder=runs/${seed}")
+    status, output = run(tmp_path, *words, options=("--multirun",))
+    assert status == 1
+    assert output.count("seed: 'maybe' is not an integer") == 1
+    assert output.count("seed: 'never' is not an integer") == 1
+    logs = sorted(str(path.relative_to(tmp_path)) for path in tmp_path.rglob("train.log"))
+    assert logs == ["runs/maybe/train.log", "runs/never/train.log"]

@@ -1,0 +1,29 @@
+import pytest
+
+from ngi.config.names import LONGEST, run_group, run_name
+
+
+@pytest.mark.parametrize(
+    ("overrides", "name"),
+    [
+        ("", "default"),
+        (None, "default"),
+        ("sampler=uniform", "sampler=uniform"),
+        ("+sweeps=demo,method=uniform", "sweeps=demo,method=uniform"),
+        ("run.folder=/tmp/x y", "run.folder=_tmp_x_y"),
+    ],
+)
+def test_names_are_readable(overrides: str | None, name: str) -> None:
+    assert run_name(overrides) == name
+
+
+def test_long_names_are_cut_but_stay_apart() -> None:
+    a, b = run_name("x" * 300 + "=1"), run_name("x" * 300 + "=2")
+    assert a != b
+    assert len(a) < LONGEST + 12
+
+
+def test_runs_are_grouped_by_experiment_or_budget_and_by_clock() -> None:
+    assert run_group("demo", "small", "wall") == "demo"
+    assert run_group(None, "small", "wall") == "small"
+    assert run_group(None, "small", "model") == "small-model-clock"

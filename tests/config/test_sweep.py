@@ -1,0 +1,175 @@
+"""What a sweep says before, between and after its runs, as its user sees it."""
+
+import json
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from ngi.config.sweep import progress
+from ngi.config.sweep_plan import Planned, duration, table
+from tests.learn.command_line import SIZE, run
+
+PLACE = "hydra.sweep.subdir='${optimizer.lr}-${seed}'"  # names of their own would be long and cut
+SWEEP = (*SIZE, "budget=steps", "budget.steps=12", "seed=0,1", "sampler=uniform", PLACE)
+
+
+def sweep(folder: Path, *words: str, options: tuple[str, ...] = ("-m",)) -> tuple[int, str]:
+    return run(folder, *words, options=options, base=SWEEP)
+
+
+def rows(output: str) -> dict[str, list[str]]:
+    """State and what follows of each run of the table, by its folder's name."""
+    found = {}
+    for line in output.splitlines():
+        if match := re.match(r"outputs/steps/(\S+)\s+(.*)", line):
+            found[match[1]] = re.split(r"\s{2,}", match[2].strip())
+    return found
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """Folder and output of a sweep of four runs, one of which is refused its optimiser."""
+    folder = tmp_path_factory.mktemp("sweep")
+    status, output = sweep(folder, "optimizer.lr=1e-3,-1")
+    assert status == 1, output
+    return folder, output
+
+
+def test_before_it_starts_its_runs_are_listed(finished: tuple[Path, str]) -> None:
+    _, output = finished
+    before = output.split("Launching")[0]
+    assert rows(before) == {
+        name: ["new", "0%", "?"] for name in ("0.001-0", "-1-0", "0.001-1", "-1-1")
+    }
+    assert "4 runs: 4 new; how long they take is not known" in before
+
+
+def test_a_line_says_how_far_it_is_after_every_run(finished: tuple[Path, str]) -> None:
+    lines = [line for line in finished[1].splitlines() if line.startswith("sweep: ")]
+    assert [line.split(",")[0] for line in lines] == [
+        f"sweep: {number} of 4 runs done" for number in (1, 2, 3, 4)
+    ]
+    failed = [re.search(r", (\d) failed", line) for line in lines]
+    assert [match and match[1] for match in failed] == [None, None, "1", "2"]
+    assert all(re.search(r"\d:\d\d so far", line) for line in lines)
+    assert all(re.search(r"about \d:\d\d left", line) for line in lines[:3])
+    assert "left" not in lines[3]
+
+
+def test_in_the_end_it_says_what_failed_and_why(finished: tuple[Path, str]) -> None:
+    folder, output = finished
+    end = output[output.index("2 runs of this sweep failed:") :].splitlines()
+    assert len(end) == 3
+    for seed, line in enumerate(end[1:]):
+        assert line == f"  outputs/steps/-1-{seed}: Invalid learning rate: -1"
+    assert not [*folder.rglob(".sweep-*")]
+
+
+def contents(folder: Path) -> dict[Path, bytes]:
+    return {file: file.read_bytes() for file in folder.rglob("*") if file.is_file()}
+
+
+def test_a_dry_run_says_what_is_finished_interrupted_longer_or_new_and_touches_nothing(
+    finished: tuple[Path, str], tmp_path: Path
+) -> None:
+    place = tmp_path / "copy"
+    shutil.copytree(finished[0], place)
+    stopped = place / "outputs" / "steps" / "0.001-1"
+    (stopped / "result.json").unlink()
+    steps = (stopped / "steps.csv").read_text().splitlines(keepends=True)
+    (stopped / "steps.csv").write_text("".join(steps[:4]))  # the header and three of twelve
+    before = contents(place)
+    words = ("seed=0,1,2", "optimizer.lr=1e-3")
+    status, output = sweep(place, *words, options=("-m", "--dry-run"))
+    assert status == 0, output
+    assert contents(place) == before
+    found = rows(output)
+    assert found["0.001-0"] == ["finished", "100%", "0:00"]
+    assert found["0.001-1"] == ["interrupted", "25%", "?"]
+    assert found["0.001-2"] == ["new", "0%", "?"]
+    assert "3 runs: 1 finished, 1 interrupted, 1 new" in output
+    assert "Launching" not in output
+
+    status, output = sweep(place, *words, "budget.steps=24", options=("-m", "--dry-run"))
+    assert rows(output)["0.001-0"][:2] == ["longer", "50%"]
+
+
+def test_what_cannot_start_is_named_beforehand(finished: tuple[Path, str]) -> None:
+    place, _ = finished
+    before = contents(place)
+    words = ("seed=0", "optimizer.lr=1e-3", "model.hidden_features=16,32")
+    status, output = sweep(place, *words, options=("-m", "--dry-run"))
+    assert status == 1
+    assert "cannot start: its folder holds another run; choose one with run.folder=…" in output
+    assert "1 finished, 1 cannot start" in output
+    assert contents(place) == before
+
+
+def test_seconds_are_known_and_one_run_alone_has_a_dry_run_too(tmp_path: Path) -> None:
+    words = ("budget=seconds", "budget.seconds=90", PLACE)
+    status, output = run(tmp_path, *words, options=("--dry-run",), base=SIZE)
+    assert status == 0, output
+    assert "new      0%      1:30" in output
+    assert "1 run: 1 new; at most 1:30 of training left" in output
+    assert not (tmp_path / "outputs").exists()
+
+
+def test_steps_take_what_they_were_measured_to_cost(tmp_path: Path) -> None:
+    """The cost file is written by hand: as many seconds a step as its components have together."""
+    from ngi.config.build import run_components
+    from ngi.learn import CostFile
+    from ngi.render import AnalyticRenderer
+    from tests.learn.composition import run_config
+
+    words = ("budget=steps", "budget.steps=1000", "sampler=mcmc_loss_step")
+    config = run_config(*SIZE, *words)
+    renderer = AnalyticRenderer(dimensions=3, patch_size=16)
+    file = CostFile(tmp_path / "costs.json")
+    for component in run_components(config, renderer=renderer):
+        file.add(component, {"train": [0.1]}, measured_by={})
+    assert len(json.loads(file.path.read_text())["components"]) == 4
+    status, output = run(
+        tmp_path, *words, f"budget.costs={file.path}", options=("--dry-run",), base=SIZE
+    )
+    assert status == 0, output
+    assert "1 run: 1 new; at most 6:40 of training left" in output
+
+
+def planned(state: str, left: float | None) -> Planned:
+    return Planned(Path("/runs") / state, state, 0.0, left)
+
+
+def test_what_is_left_goes_by_what_was_left_of_each() -> None:
+    runs = [
+        planned("finished", 0),
+        planned("new", 100),
+        planned("interrupted", 50),
+        planned("new", 50),
+    ]
+    assert progress(runs, [0], 0, 2) == "sweep: 1 of 4 runs done, 0:02 so far"
+    assert progress(runs, [0, 1], 1, 120).endswith("1 failed, 2:00 so far, about 2:00 left")
+    assert progress(runs, [0, 2, 1], 0, 120).endswith("2:00 so far, about 0:40 left")
+    assert progress(runs, [0, 1, 2, 3], 0, 240) == "sweep: 4 of 4 runs done, 4:00 so far"
+
+
+def test_unknown_times_count_as_the_typical_one() -> None:
+    runs = [planned("new", None), planned("new", 100), planned("new", None)]
+    assert progress(runs, [0], 0, 10).endswith("about 0:20 left")
+    assert progress([planned("new", None)] * 2, [0], 0, 10).endswith("about 0:10 left")
+
+
+def test_the_table_adds_up() -> None:
+    runs = [planned("new", 3000), planned("interrupted", 700), planned("again", None)]
+    shown = table([*runs, planned("finished", 0), planned("cannot start: no", None)])
+    assert "5 runs: 1 new, 1 interrupted, 1 again, 1 finished, 1 cannot start;" in shown
+    assert "at most 1:01:40 of training left; how long 1 of them take is not known" in shown
+
+
+@pytest.mark.parametrize(
+    ("seconds", "shown"),
+    [(0, "0:00"), (59.2, "1:00"), (3599, "59:59"), (3600, "1:00:00"), (None, "?")],
+)
+def test_durations(seconds: float | None, shown: str) -> None:
+    assert duration(seconds) == shown

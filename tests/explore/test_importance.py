@@ -1,0 +1,92 @@
+import numpy as np
+import pytest
+import torch
+from scipy import stats
+
+from ngi.explore import Importance
+
+VALUES = torch.tensor([0.0, 1.0, 2.0, 5.0])
+
+
+def test_the_density_is_the_mixture_of_its_formula() -> None:
+    found = Importance(uniform_share=0.2, power=2.0).probabilities(VALUES)
+    squares = np.array([0.0, 1.0, 4.0, 25.0])
+    expected = 0.2 / 4 + 0.8 * squares / squares.sum()
+    np.testing.assert_allclose(found.numpy(), expected, rtol=1e-12)
+
+
+def test_weights_undo_the_density_and_are_bounded() -> None:
+    """The weighted mean over what is drawn is the mean over all candidates."""
+    importance = Importance(uniform_share=0.25, weighted=True)
+    density = importance.probabilities(VALUES)
+    weights = importance.weights(density)
+    quantity = torch.tensor([3.0, -1.0, 4.0, 1.0], dtype=torch.float64)
+    assert (density * weights * quantity).sum().item() == pytest.approx(quantity.mean().item())
+    assert weights.max().item() == pytest.approx(1 / 0.25)  # where the value is 0
+
+
+def test_without_weights_all_count_the_same() -> None:
+    _, weights = Importance(uniform_share=0.5).draw(VALUES, 3, torch.Generator().manual_seed(0))
+    assert weights.tolist() == [1, 1, 1]
+
+
+def test_single_draws_follow_the_density() -> None:
+    importance = Importance(uniform_share=0.2)
+    generator = torch.Generator().manual_seed(1)
+    drawn = [importance.draw(VALUES, 1, generator)[0].item() for _ in range(4000)]
+    expected = 4000 * importance.probabilities(VALUES).numpy()
+    assert stats.chisquare(np.bincount(drawn, minlength=4), expected).pvalue > 1e-3
+
+
+def test_several_draws_are_different_candidates_and_follow_successive_sampling() -> None:
+    """The second of two: sum over first ones of p_i p_j / (1 - p_i)."""
+    importance = Importance(uniform_share=0.2)
+    generator = torch.Generator().manual_seed(2)
+    pairs = [importance.draw(VALUES, 2, generator)[0].tolist() for _ in range(4000)]
+    assert all(first != second for first, second in pairs)
+    p = importance.probabilities(VALUES).numpy()
+    second = np.array([sum(p[i] * p[j] / (1 - p[i]) for i in range(4) if i != j) for j in range(4)])
+    counts = np.bincount([second for _, second in pairs], minlength=4)
+    assert stats.chisquare(counts, 4000 * second).pvalue > 1e-3
+
+
+def test_candidates_without_value_are_drawn_when_nothing_else_is_left() -> None:
+    drawn, _ = Importance(uniform_share=0.0).draw(VALUES, 4, torch.Generator().manual_seed(0))
+    assert sorted(drawn.tolist()) == [0, 1, 2, 3]
+    assert drawn[-1] == 0
+
+
+@pytest.mark.parametrize("values", [[0.0, 0.0], [float("nan"), float("inf")]])
+def test_without_any_value_the_density_is_uniform(values: list[float]) -> None:
+    found = Importance(uniform_share=0.0).probabilities(torch.tensor(values))
+    assert found.tolist() == [0.5, 0.5]
+
+
+def test_tiny_and_huge_values_keep_their_proportion() -> None:
+    values = torch.tensor([1e-30, 3e-30])
+    assert Importance(uniform_share=0.0, power=3.0).probabilities(values).tolist() == pytest.approx(
+        [1 / 28, 27 / 28]
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        ({"uniform_share": -0.1}, "uniform_share: -0.1"),
+        ({"uniform_share": 1.5}, "uniform_share: 1.5"),
+        ({"uniform_share": float("nan")}, "uniform_share: nan"),
+        ({"uniform_share": 0.5, "power": 0.0}, "power: 0.0"),
+        ({"uniform_share": 0.0, "weighted": True}, "no bound"),
+    ],
+)
+def test_numbers_out_of_range_are_refused(arguments: dict[str, float], named: str) -> None:
+    with pytest.raises(ValueError, match=named):
+        Importance(**arguments)
+
+
+def test_more_draws_than_candidates_and_negative_values_are_refused() -> None:
+    importance = Importance(uniform_share=0.5)
+    with pytest.raises(ValueError, match="5 of 4"):
+        importance.draw(VALUES, 5, torch.Generator())
+    with pytest.raises(ValueError, match="-1"):
+        importance.probabilities(torch.tensor([1.0, -1.0]))

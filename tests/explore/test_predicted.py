@@ -1,0 +1,169 @@
+"""The forest, and the sampler that draws by its predictions."""
+
+from pathlib import Path
+
+import pytest
+import torch
+from scipy import stats
+
+from ngi.explore import Importance, PredictedLoss
+from ngi.explore.forest import PRIOR, grow
+from ngi.learn import TrainingStream
+from ngi.render import PocketRenderer
+from ngi.reuse import Epochs
+from tests.learn.comparison import assert_same
+from tests.learn.small_stream import make, steps
+
+CHAINS = 4
+
+
+def sampler(**changes: object) -> PredictedLoss:
+    arguments: dict[str, object] = {
+        "chains": CHAINS,
+        "candidates": 64,
+        "importance": Importance(uniform_share=0.2, weighted=True),
+        "memory": 256,
+        "trees": 8,
+        "depth": 5,
+        "smallest_leaf": 2,
+    }
+    return PredictedLoss(**{**arguments, **changes})  # type: ignore[arg-type]
+
+
+def test_a_single_split_is_that_of_its_formula() -> None:
+    """Two groups: every threshold between them gives the same leaves, shrunk to the mean."""
+    points = torch.tensor([[0.1], [0.11], [0.9], [0.91]])
+    values = torch.tensor([1.0, 3.0, 10.0, 14.0])
+    forest = grow(
+        points, values, torch.Generator().manual_seed(0), trees=5, depth=1, smallest_leaf=2
+    )
+    low = (1 + 3 + PRIOR * 7) / (2 + PRIOR)
+    high = (10 + 14 + PRIOR * 7) / (2 + PRIOR)
+    found = forest(torch.tensor([[0.0], [0.1], [0.91], [1.0]]))
+    assert found.tolist() == pytest.approx([low, low, high, high])
+
+
+def test_few_variables_that_matter_are_found_among_many() -> None:
+    generator = torch.Generator().manual_seed(1)
+    points = torch.rand(1000, 30, generator=generator)
+    test = torch.rand(1000, 30, generator=generator)
+
+    def rare(states: torch.Tensor) -> torch.Tensor:
+        return ((states[:, 3] > 0.7) & (states[:, 17] < 0.3)).float()
+
+    forest = grow(points, rare(points), generator, trees=16, depth=6, smallest_leaf=3)
+    truth = rare(test).bool()
+    predicted = forest(test)
+    order = stats.mannwhitneyu(predicted[truth], predicted[~truth]).statistic
+    assert order / (truth.sum() * (~truth).sum()) > 0.95
+
+
+def test_too_few_samples_are_not_split() -> None:
+    points = torch.rand(5, 2, generator=torch.Generator().manual_seed(0))
+    forest = grow(points, torch.arange(5.0), torch.Generator(), trees=3, depth=4, smallest_leaf=3)
+    assert torch.allclose(forest(points), torch.full((5,), 2.0))
+
+
+def test_states_are_uniform_as_long_as_hardly_any_loss_is_known() -> None:
+    found = sampler()
+    state = found.init(3)
+    generator = torch.Generator().manual_seed(3)
+    proposed = [found.propose(state, generator, batch=b) for b in range(200)]
+    positions = torch.cat([p.position for p in proposed])
+    for column in positions.T:
+        assert stats.kstest(column.numpy(), "uniform").pvalue > 1e-3
+    weights = torch.cat([p.weight for p in proposed if p.weight is not None])
+    assert weights.tolist() == [1.0] * (200 * CHAINS)
+
+
+def explored(found: PredictedLoss, *, batches: int) -> tuple[torch.Tensor, torch.Tensor]:
+    """States proposed in the second half, and their weights; the loss is 1 in a rare box, or 0."""
+    state, generator = found.init(4), torch.Generator().manual_seed(4)
+    late = []
+    for batch in range(batches):
+        proposals = found.propose(state, generator, batch=batch)
+        losses = lit(proposals.position)
+        ids = torch.arange(CHAINS) + CHAINS * batch
+        state, _ = found.accept(
+            state, proposals, ids, None, torch.zeros(CHAINS), generator, losses=losses
+        )
+        if batch >= batches // 2:
+            late.append((proposals.position, proposals.weight))
+    weights = [torch.ones(CHAINS) if w is None else w for _, w in late]
+    return torch.cat([p for p, _ in late]), torch.cat(weights)
+
+
+def lit(states: torch.Tensor) -> torch.Tensor:
+    return ((states[:, 0] < 0.3) & (states[:, 1] > 0.7)).float()
+
+
+def test_rare_losses_are_drawn_more_often_and_weigh_less() -> None:
+    states, weights = explored(sampler(), batches=150)
+    share = lit(states).double().mean().item()
+    assert share > 3 * 0.09
+    assert weights.max() <= 1 / 0.2
+    weighted = (weights * lit(states)).mean().item()
+    assert weighted == pytest.approx(0.09, abs=0.04)
+
+
+def test_without_weights_nothing_weighs() -> None:
+    found = sampler(importance=Importance(uniform_share=0.5))
+    proposals = found.propose(found.init(3), torch.Generator(), batch=0)
+    assert proposals.weight is None
+
+
+def test_the_oldest_and_what_is_not_finite_are_forgotten() -> None:
+    found = sampler(memory=10)
+    state, generator = found.init(3), torch.Generator().manual_seed(0)
+    for batch in range(5):
+        proposals = found.propose(state, generator, batch=batch)
+        losses = torch.tensor([batch, float("nan"), float("inf"), batch + 0.5])
+        ids = torch.arange(CHAINS)
+        state, _ = found.accept(
+            state, proposals, ids, None, torch.zeros(CHAINS), generator, losses=losses
+        )
+    assert state.loss.tolist() == [0, 0.5, 1, 1.5, 2, 2.5, 3, 3.5, 4, 4.5]
+    assert torch.equal(state.seen[-1], proposals.position[3])
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        ({"chains": 0}, "sampler.chains: 0"),
+        ({"candidates": 3}, "sampler.candidates: 3: give at least 4"),
+        ({"memory": 7}, "sampler.memory: 7: give at least 8"),
+        ({"trees": 0}, "sampler.trees: 0"),
+        ({"depth": 0}, "sampler.depth: 0"),
+        ({"smallest_leaf": 0}, "sampler.smallest_leaf: 0"),
+    ],
+)
+def test_numbers_out_of_range_are_refused(change: dict[str, int], named: str) -> None:
+    with pytest.raises(ValueError, match=named):
+        sampler(**change)
+
+
+def stream(folder: Path) -> TrainingStream:
+    renderer = PocketRenderer(dimensions=3, volume=0.1, pockets=1, sharpness=0.0, patch_size=8)
+    return make(folder, sampler=sampler(), renderer=renderer, rule=Epochs())
+
+
+def test_an_interrupted_stream_goes_on_with_the_same_batches_and_weights(tmp_path: Path) -> None:
+    """Stored patches keep the weights with which they were drawn."""
+    whole = stream(tmp_path / "whole")
+    for _ in steps(whole, 30):
+        pass
+    state = whole.state_dict()
+    again = stream(tmp_path / "whole")
+    again.load_state_dict(state)
+    expected, found = list(steps(whole, 30)), list(steps(again, 30))
+    for first, second in zip(expected, found, strict=True):
+        assert_same(vars(first.patches), vars(second.patches))
+        assert first.loss_weights is not None
+        assert second.loss_weights is not None
+        assert torch.equal(first.loss_weights, second.loss_weights)
+    by_id: dict[int, float] = {}
+    for batch in expected:
+        assert batch.loss_weights is not None
+        for patch, weight in zip(batch.ids.tolist(), batch.loss_weights.tolist(), strict=True):
+            assert by_id.setdefault(patch, weight) == weight
+    assert len(set(by_id.values())) > 10

@@ -1,0 +1,115 @@
+from dataclasses import fields
+
+import pytest
+import torch
+
+from ngi.render import PocketRenderer
+from ngi.studies.exploration_map.plan import PLANS, Plan
+from ngi.studies.exploration_map.setting import METHODS, Method, Setting
+from ngi.studies.exploration_map.test_set import TestSet
+from ngi.studies.exploration_map.training import configuration, train
+
+SMALL = Plan(settings=(), steps=12, evaluations=3, frames=20)
+SETTING = Setting(volume=0.1, dimensions=2, active=2, hidden_features=8)
+
+
+def rows(method: Method, *, seed: int = 0, plan: Plan = SMALL, setting: Setting = SETTING):
+    return list(train(setting, method, seed, plan))
+
+
+def test_uniform_samples_are_lit_as_often_as_the_volume_says() -> None:
+    plan = Plan(settings=(), steps=150, evaluations=3, frames=20)
+    setting = Setting(volume=0.3, dimensions=2, active=2, sharpness=1.0, hidden_features=4)
+    for row in rows(Method("uniform", reuse=False), plan=plan, setting=setting):
+        deviation = (0.3 * 0.7 / (row["step"] * 16)) ** 0.5
+        assert abs(row["lit"] - 0.3) < 4 * deviation
+
+
+def test_batches_are_counted() -> None:
+    """Without reuse every batch is new; the first has no current states to be scored."""
+    last = rows(Method("loss_greedy", reuse=False))[-1]
+    assert (last["step"], last["generated_batches"], last["scored_batches"]) == (12, 12, 11)
+    assert rows(Method("uniform", reuse=False))[-1]["scored_batches"] == 0
+
+
+def test_stored_patches_are_used_again() -> None:
+    plan = Plan(settings=(), steps=60, evaluations=1, frames=20)
+    (row,) = rows(Method("uniform", reuse=True), plan=plan)
+    assert 20 <= row["generated_batches"] < 40  # 20 in the bootstrap
+
+
+def test_evaluations_are_spread_evenly_and_runs_repeat() -> None:
+    method = Method("output_gradient_metropolis", reuse=True)
+    first = rows(method)
+    assert [row["step"] for row in first] == [4, 8, 12]
+    assert first == rows(method)
+    assert first != [{**row, "seed": 0} for row in rows(method, seed=1)]
+
+
+def test_learning_lowers_the_error() -> None:
+    plan = Plan(settings=(), steps=150, evaluations=10, frames=20)
+    setting = Setting(volume=1e-3, dimensions=2, active=2, hidden_features=16)
+    found = rows(Method("uniform", reuse=False), plan=plan, setting=setting)
+    assert found[-1]["error_uniform"] < 0.5 * found[0]["error_uniform"]
+
+
+@pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
+def test_methods_are_what_their_names_say(method: Method) -> None:
+    config = configuration(method)
+    names = {
+        "uniform": ("ConstantTarget", "Always"),
+        "loss_greedy": ("Loss", "Greedy"),
+        "loss_metropolis": ("Loss", "Metropolis"),
+        "loss_step_greedy": ("LossTimesStep", "Greedy"),
+        "loss_step_metropolis": ("LossTimesStep", "Metropolis"),
+        "output_gradient_greedy": ("LossTimesOutputGradient", "Greedy"),
+        "output_gradient_metropolis": ("LossTimesOutputGradient", "Metropolis"),
+    }
+    target, acceptance = names[method.sampler]
+    assert config.sampler.target._target_ == f"ngi.explore.{target}"
+    assert config.sampler.acceptance._target_ == f"ngi.explore.{acceptance}"
+    assert config.reuse.policy._target_.endswith("SelfTuning" if method.reuse else "Never")
+
+
+def test_there_are_fourteen_methods_and_every_knob_is_varied() -> None:
+    assert len({method.name for method in METHODS}) == 14
+    settings = PLANS["full"].settings
+    assert len({setting.name for setting in settings}) == len(settings)
+    for field in fields(Setting):
+        values = {getattr(setting, field.name) for setting in settings}
+        assert len(values) >= 2, field.name
+    for plan in PLANS.values():
+        assert plan.steps % plan.evaluations == 0
+
+
+class Shifted(torch.nn.Module):
+    """Wrong by a constant that grows with v's first component."""
+
+    def __init__(self, renderer: PocketRenderer) -> None:
+        super().__init__()
+        self.renderer = renderer
+        self.shifts: list[float] = []
+
+    def forward(self, buffers: torch.Tensor, scene_vector: torch.Tensor) -> torch.Tensor:
+        _, radiance = self.renderer.shade(scene_vector, buffers[..., :2])
+        self.shifts = scene_vector[:, 0].tolist()
+        return radiance.log1p() + scene_vector[:, 0, None, None, None]
+
+
+def test_errors_are_means_over_the_frames() -> None:
+    renderer = PocketRenderer(**SETTING.scene, patch_size=8)
+    network = Shifted(renderer)
+    errors = TestSet(renderer, frames=40).errors(network)
+    everywhere, inside = network.shifts[:36], network.shifts[36:]
+    worst = sorted(network.shifts)[-2:]
+    assert errors["error_uniform"] == pytest.approx(sum(everywhere) / 36, abs=1e-5)
+    assert errors["error_pocket"] == pytest.approx(sum(inside) / 4, abs=1e-5)
+    assert errors["error_tail"] == pytest.approx(sum(worst) / 2, abs=1e-5)
+
+
+def test_a_tenth_of_the_frames_is_in_the_pockets() -> None:
+    renderer = PocketRenderer(**{**SETTING.scene, "volume": 1e-4, "sharpness": 1.0}, patch_size=8)
+    seen = []
+    TestSet(renderer, frames=40).errors(lambda buffers, v: seen.append(v) or buffers[..., :3])
+    lit = renderer.weights(seen[0]).sum(dim=1) > 0
+    assert lit.tolist() == [False] * 36 + [True] * 4

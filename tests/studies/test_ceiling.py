@@ -1,0 +1,174 @@
+"""The study of what a choice of patches could gain, on closed formulas."""
+
+import json
+from pathlib import Path
+
+import pandas as pd
+import pytest
+import torch
+from omegaconf import DictConfig
+
+from ngi.config.configuration import composed
+from ngi.explore import Importance
+from ngi.studies.ceiling import campaign, runs
+from ngi.studies.ceiling.runs import Run, plan, true_errors
+
+SMALL = (
+    *("renderer=pockets", "data=patches", "renderer.patch_size=16", "renderer.dimensions=2"),
+    *("~renderer.direct", "budget=smoke", "trainer=fp32", "model.hidden_features=16"),
+    "model.directions=false",
+    *("resolution.start=32", "sampler.chains=4", "evaluation.evaluator.protocol.resolution=32"),
+    *("ceiling.pool=64", "ceiling.patches=[16]", "ceiling.steps=[8]", "ceiling.rounds=2"),
+    *("ceiling.teacher_steps=4", "ceiling.seeds=1"),
+)
+
+
+def configuration(folder: Path, *overrides: str) -> DictConfig:
+    return composed(
+        "experiment=ceiling",
+        *SMALL,
+        f"run.folder={folder}",
+        f"run.references={folder}/references",
+        *overrides,
+    )
+
+
+def test_every_run_of_a_small_study_is_done_once_and_repeats(tmp_path: Path) -> None:
+    first = pd.read_csv(campaign.run_all(configuration(tmp_path / "a")))
+    assert list(first["choice"]) == ["uniform", "oracle", "oracle_weighted", "uniform"]
+    assert list(first["patches"]) == [16, 16, 16, 64]
+    assert (first[["hard_error", "uniform_error", "hard_tail"]] > 0).all(axis=None)
+    assert first["hard_error"].nunique() == 4
+    files = sorted((tmp_path / "a" / "runs").iterdir())
+    before = [file.stat().st_mtime_ns for file in files]
+    files[1].unlink()
+    again = pd.read_csv(campaign.run_all(configuration(tmp_path / "a")))
+    pd.testing.assert_frame_equal(first, again)
+    assert [file.stat().st_mtime_ns for file in files[2:]] == before[2:]
+
+
+def test_a_folder_of_another_study_is_refused(tmp_path: Path) -> None:
+    folder = tmp_path / "a"
+    folder.mkdir()
+    with pytest.raises(ValueError, match="multiple of 32"):
+        campaign.run_all(configuration(folder, "ceiling.pool=40"))
+    found = json.loads((folder / "provenance.json").read_text())
+    assert found["study"]["pool"] == 40
+    with pytest.raises(ValueError, match="made with another study"):
+        campaign.run_all(configuration(folder))
+
+
+def test_with_the_whole_pool_there_is_no_choice() -> None:
+    found = list(plan(pool=64, patches=[8, 16], steps=[5, 9], choices=["a", "b"], seeds=2))
+    assert len(found) == len(set(found)) == 2 * 2 * 5
+    assert [run.choice for run in found if run.patches == 64] == ["a"] * 4
+    assert [run.seed for run in found] == sorted(run.seed for run in found)
+
+
+class Recorder:
+    """A training that trains nothing, and is the more wrong the larger the patch."""
+
+    def __init__(self) -> None:
+        self.added: list[torch.Tensor] = []
+        self.weights: list[torch.Tensor] = []
+        self.steps: list[int] = []
+
+    def add(self, patches, weights) -> None:
+        self.added.append(patches)
+        self.weights.append(weights)
+
+    def train(self, steps: int) -> None:
+        self.steps.append(steps)
+
+    def errors(self, patches, truth):
+        return (patches - truth).abs()
+
+    predict = None
+
+
+class NoEvaluator:
+    def evaluate(self, predict) -> None:  # noqa: ARG002
+        return None
+
+
+@pytest.fixture
+def recorded(monkeypatch: pytest.MonkeyPatch):
+    """Does a run on a pool of numbers, whose true errors are these numbers."""
+    monkeypatch.setattr(runs, "chosen", lambda pool, indices: pool[indices])
+    monkeypatch.setattr(runs, "measured", lambda _: {"hard_error": 1.0})
+
+    def do(choice: Importance, *, seed: int = 0) -> Recorder:
+        training = Recorder()
+        pool = torch.arange(1000.0)
+        run = Run(patches=50, steps=90, choice="any", seed=seed)
+        row = runs.do(
+            run,
+            training,
+            pool=pool,
+            truth=torch.zeros(1000),
+            choice=choice,
+            rounds=4,
+            evaluator=NoEvaluator(),
+        )
+        assert row == {**run._asdict(), "hard_error": 1.0}
+        return training
+
+    return do
+
+
+def test_patches_and_steps_come_in_equal_rounds_and_no_patch_twice(recorded) -> None:
+    training = recorded(Importance(uniform_share=0.0))
+    assert [len(part) for part in training.added] == [12, 13, 12, 13]
+    assert training.steps == [22, 23, 22, 23]
+    assert len(set(torch.cat(training.added).tolist())) == 50
+
+
+def test_choices_of_one_seed_begin_with_the_same_patches(recorded) -> None:
+    uniform, oracle = (recorded(Importance(uniform_share=share)) for share in (1.0, 0.0))
+    assert torch.equal(uniform.added[0], oracle.added[0])
+    assert not torch.equal(uniform.added[1], oracle.added[1])
+    other = recorded(Importance(uniform_share=1.0), seed=1)
+    assert not torch.equal(uniform.added[0], other.added[0])
+
+
+def test_the_oracle_draws_in_proportion_to_the_true_error(recorded) -> None:
+    """Over 0 … 999 the mean is 499.5 for uniform draws and 666 in proportion to the error."""
+    means = {
+        share: torch.cat(
+            [
+                torch.cat(recorded(Importance(uniform_share=share), seed=s).added[1:])
+                for s in range(8)
+            ]
+        )
+        .mean()
+        .item()
+        for share in (1.0, 0.0)
+    }
+    assert means[1.0] == pytest.approx(499.5, abs=4 * 289 / 304**0.5)
+    assert means[0.0] == pytest.approx(666, abs=4 * 236 / 304**0.5)
+
+
+def test_weights_go_with_their_patches(recorded) -> None:
+    training = recorded(Importance(uniform_share=0.2, weighted=True))
+    assert training.weights[0].tolist() == [1.0] * 12
+    for errors, weights in zip(training.added[1:], training.weights[1:], strict=True):
+        assert torch.equal(errors.argsort(descending=True), weights.argsort())
+        assert weights.max() <= 5
+
+
+def test_true_errors_are_those_of_the_patches_named() -> None:
+    class Training:
+        def errors(self, patches, truth):
+            (answers,) = (p.scene_vector[:, 0] for p in [patches])
+            return (answers - truth).abs()
+
+    from ngi.patches import BufferLayout, Patches
+    from ngi.reuse import CompactPatches
+
+    layout = BufferLayout(("position",))
+    blank = Patches.blank(6, layout=layout, dimensions=1, patch_size=4)
+    blank.scene_vector[:, 0] = torch.arange(6.0)
+    pool = CompactPatches.compress(blank, layout)
+    truth = torch.tensor([0.0, 0, 0, 0, 1, 1])
+    found = true_errors(Training(), pool, truth, torch.tensor([5, 2]))
+    assert found.tolist() == [4, 2]

@@ -1,0 +1,190 @@
+"""The command that describes scenes: what varies, what is left out, and cameras in walls."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+import yaml
+
+from ngi.machine.backend import activate, dr, llvm_problem
+from ngi.scene import read_scene
+from ngi.scene.clearance import camera_problems
+from ngi.scene.extent import meeting_views
+from ngi.scene.variable_scene import VariableScene
+from ngi.view.describe import main
+
+BOX = Path(__file__).parents[1] / "render" / "scenes" / "box"
+
+ROOM = """<scene version="3.0.0">
+<integrator type="path"><integer name="max_depth" value="3"/></integrator>
+<sensor type="perspective" id="camera"><transform name="to_world">
+  <lookat origin="0,1,2" target="0,1,0" up="0,1,0"/></transform>
+  <film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="8"/></film>
+</sensor>
+<bsdf type="twosided" id="paint"><bsdf type="diffuse">
+  <rgb name="reflectance" value="0.5"/></bsdf></bsdf>
+<bsdf type="diffuse" id="grey"/>
+<shape type="rectangle" id="floor"><transform name="to_world"><scale value="4"/>
+  <rotate x="1" angle="-90"/></transform><ref id="paint"/></shape>
+<shape type="sphere" id="ball"><float name="radius" value="0.5"/><ref id="paint"/></shape>
+<shape type="rectangle" id="lamp"><transform name="to_world"><rotate x="1" angle="90"/>
+  <translate y="4"/></transform><emitter type="area"/></shape>
+</scene>"""
+
+
+@pytest.fixture
+def room(tmp_path):
+    def make(*variables):
+        (tmp_path / "scene.xml").write_text(ROOM)
+        entries = ",\n".join(variables)
+        (tmp_path / "scene.yaml").write_text(
+            "{name: room, scene: scene.xml, samples_per_pixel: 1, max_depth: 3,\n"
+            f"bounds: {{minimum: [-4, 0, -4], maximum: [4, 4, 4]}}, variables: [{entries}]}}"
+        )
+        return tmp_path
+
+    return make
+
+
+def look_from(low, high):
+    return (
+        f"{{object: camera, property: look_at, minimum: [{low}, 0,1,0], maximum: [{high}, 0,1,0]}}"
+    )
+
+
+FREE = look_from("-1,0.8,1.5", "1,2,3")
+PATH = "{object: camera, property: camera_path, keys: [[-2,1,0, 0,1,-3], [2,HEIGHT,0, 0,1,-3]]}"
+MOVE_BALL = "{object: ball, property: translation, minimum: [0,0,0], maximum: [0,1,2]}"
+MOVE_FLOOR = "{object: floor, property: translation, minimum: [0,0,0], maximum: [0,2,0]}"
+PAINT = "{object: paint, property: albedo, minimum: [0,0,0], maximum: [1,1,1]}"
+
+CAMERAS = {
+    "a box in free air": ([FREE], None),
+    "a fixed camera": ([PAINT], None),
+    "a box with the ball in it": ([look_from("-1,0.1,-1", "1,0.9,3")], "reaches into the camera's"),
+    "a box that a moving ball enters": ([FREE, MOVE_BALL], "reaches into the camera's range"),
+    "a box that ends below the floor": ([look_from("-1,-0.2,1.5", "1,2,3")], "reaches into"),
+    "a box inside the ball": ([look_from("-0.1,0,0", "0.1,0,0")], "inside an object"),
+    "a box along the floor": ([look_from("1,0.003,1.5", "2,0.004,3")], "only 0.00"),
+    "a fixed camera that the floor passes": ([MOVE_FLOOR], "only"),
+    "a path through free air": ([PATH.replace("HEIGHT", "1.2")], None),
+    "a path through the ball": ([PATH.replace("HEIGHT", "-0.5")], "reaches into"),
+}
+
+
+@pytest.mark.parametrize("name", CAMERAS)
+def test_cameras(room, name) -> None:
+    activate("scalar")
+    variables, expected = CAMERAS[name]
+    problems = camera_problems(VariableScene(read_scene(room(*variables))))
+    if expected is None:
+        assert problems == []
+    elif name == "a fixed camera that the floor passes":
+        assert problems == [], "at no single v does it stand exactly in the floor"
+    else:
+        assert problems
+        assert any(expected in problem for problem in problems), problems
+
+
+def test_a_scene_folder(capsys) -> None:
+    assert main([str(BOX), "--backend", "scalar"]) == 0
+    text = capsys.readouterr().out
+    assert "box: 10 dimensions" in text
+    assert "v[3:6]  ball.translation (x, y, z): -0.4, -0.2, -0.4 ... 0.4, 0.6, 0.4" in text
+    assert "outgoing  kept: it differs from pixel to pixel" in text
+    assert "roughness  kept: a variable changes it" in text
+    assert "moves: ball, figure\n" in text
+    assert "camera:  in free air" in text
+
+
+def test_a_camera_in_geometry_is_an_error(room, capsys) -> None:
+    folder = room(look_from("-1,0.1,-1", "1,0.9,3"))
+    assert main([str(folder), "--backend", "scalar"]) == 1
+    assert "error: at v = [0.0, 0.0, 0.0]: geometry reaches into" in capsys.readouterr().out
+
+
+def test_a_camera_that_can_look_nowhere_is_an_error(room, capsys) -> None:
+    folder = room(look_from("-1,0.8,0", "1,2,3"))
+    assert main([str(folder), "--backend", "scalar"]) == 1
+    text = capsys.readouterr().out
+    assert "camera.look_at: origin and target can meet, for example at [0.0, 1.0, 0.0]" in text
+
+
+@pytest.mark.parametrize(("low", "high", "meet"), [("0,0,0", "2,2,2", 1), ("0,1,0", "2,2,2", 0)])
+def test_a_linked_camera_meets_its_target_where_both_are_at_once(room, low, high, meet) -> None:
+    """From there to (1, 1, 1) and back for the target: in the middle, or never."""
+    linked = (
+        f"{{object: camera, property: look_at, minimum: [{low}, 1,1,1], "
+        f"maximum: [{high}, 1,1,1], linked: true}}"
+    )
+    lines = meeting_views(read_scene(room(linked)))
+    assert len(lines) == meet
+    assert all("for example at [1.0, 1.0, 1.0]" in line for line in lines)
+
+
+def test_the_rays_of_the_check_are_recorded_once(room, monkeypatch) -> None:
+    """Wherever NumPy's memory happens to lie."""
+    if llvm_problem() is not None:
+        pytest.skip(str(llvm_problem()))
+    activate("llvm")
+    scene = VariableScene(read_scene(room(FREE)))
+    frozen = []
+    freeze = dr.freeze
+    monkeypatch.setattr(dr, "freeze", lambda f: frozen.append(freeze(f)) or frozen[-1])
+    assert camera_problems(scene) == []
+    assert [function.n_recordings for function in frozen] == [1]
+
+
+def test_geometry_out_of_bounds_is_noted(room, capsys) -> None:
+    upwards = MOVE_BALL.replace("[0,1,2]", "[0,9,2]").replace("minimum: [0,0", "minimum: [0,0.5")
+    assert main([str(room(FREE, upwards)), "--backend", "scalar"]) == 1  # it meets the camera
+    text = capsys.readouterr().out
+    assert "note: 'ball' reaches 5.5 out of bounds" in text
+    assert text.count("note:") == 1
+
+
+def test_a_plain_file_becomes_a_variable_scene(room, capsys) -> None:
+    folder = room(FREE)
+    (folder / "scene.yaml").unlink()
+    assert main([str(folder / "scene.xml"), "--backend", "scalar"]) == 0
+    text = capsys.readouterr().out
+    assert "camera: look_at" in text
+    assert "paint: albedo" in text
+    assert "grey" not in text, "its reflectance is no colour"
+    assert "ball: translation, rotation, scale, visibility" in text
+    assert "lamp: translation, rotation, scale, intensity" in text
+    starter = (folder / "scene.yaml").read_text()
+    description = read_scene(folder)
+    assert description.component_names == tuple(
+        f"camera.look_at.{name}"
+        for name in ("origin_x", "origin_y", "origin_z", "target_x", "target_z")
+    )
+    assert len(description.hard_frames) == 10
+    # Every candidate is an entry that works once its # is gone.
+    lines = [line.replace("  # - ", "  - ") for line in starter.splitlines()]
+    (folder / "scene.yaml").write_text("\n".join(lines))
+    everything = read_scene(folder)
+    entries = yaml.safe_load((folder / "scene.yaml").read_text())["variables"]
+    assert len(everything.variables) == len(entries) > 10
+    VariableScene(everything).apply([0.5] * everything.dimensions)
+    before = (folder / "scene.yaml").read_text()
+    assert main([str(folder / "scene.xml"), "--backend", "scalar"]) == 0
+    assert (folder / "scene.yaml").read_text() == before, "an existing scene.yaml was overwritten"
+
+
+@pytest.mark.parametrize(
+    ("edit", "message"),
+    [
+        (lambda folder: (folder / "scene.yaml").write_text("name: ["), "broken YAML"),
+        (lambda folder: (folder / "scene.xml").unlink(), "names 'scene.xml', which is not there"),
+        (lambda folder: shutil.rmtree(folder), "no scene of this name"),
+    ],
+)
+def test_errors_are_one_line(room, capsys, edit, message) -> None:
+    folder = room(FREE)
+    edit(folder)
+    assert main([str(folder), "--backend", "scalar"]) == 1
+    error = capsys.readouterr().err
+    assert error.startswith("error: ")
+    assert message in error
+    assert error.count("\n") == 1
