@@ -47,7 +47,7 @@ class Sweep(Callback):
 
     def on_run_start(self, config: DictConfig, **_: Any) -> None:
         if self._dry_run:
-            _show_and_exit([planned_run(config.copy(), {})])
+            _show_and_exit([planned_run(config, {})])
 
     def on_multirun_start(self, config: DictConfig, **_: Any) -> None:
         runs = self._planned(config)

@@ -16,7 +16,7 @@ from hydra.core.hydra_config import HydraConfig
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.errors import HydraException
 from hydra.utils import instantiate
-from omegaconf import DictConfig, open_dict, read_write
+from omegaconf import DictConfig, OmegaConf, open_dict
 from omegaconf.errors import OmegaConfBaseException
 from tabulate import tabulate
 from tqdm import tqdm
@@ -61,7 +61,7 @@ def planned_runs(config: DictConfig, loader: ConfigLoader) -> list[Planned]:
     if sweeper._target_ != f"{BasicSweeper.__module__}.{BasicSweeper.__name__}":
         return []
     words = [f"{key}={value}" for key, value in (sweeper.params or {}).items()]
-    words += list(config.hydra.overrides.task)
+    words += OmegaConf.to_container(config.hydra.overrides.task, resolve=False)
     overrides = OverridesParser.create(config_loader=loader).parse_overrides(words)
     (jobs,) = BasicSweeper.split_arguments(overrides, max_batch_size=None)
     costs: dict[str, float | None] = {}
@@ -71,14 +71,12 @@ def planned_runs(config: DictConfig, loader: ConfigLoader) -> list[Planned]:
 
 def planned_run(config: DictConfig, costs: dict[str, float | None]) -> Planned:
     """config: of one job, with Hydra's own part; costs: seconds per step, kept between calls"""
-    folder = Path(config.hydra.sweep.dir, config.hydra.sweep.subdir).resolve()
-    with read_write(config.hydra.runtime), open_dict(config.hydra.runtime):
-        config.hydra.runtime.output_dir = str(folder)
     HydraConfig.instance().set_config(config)
+    config = config.copy()  # Hydra's own part goes on resolving in the one that it is part of
     with open_dict(config):
         del config["hydra"]
+    folder = Path(config.run.folder).resolve()
     try:
-        folder = Path(config.run.folder)
         budget: Budget = instantiate(config.budget)
         state = _state(config, folder)
         done = _done(folder, budget) if state in ("interrupted", "longer") else 0.0

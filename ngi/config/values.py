@@ -5,10 +5,10 @@ from __future__ import annotations
 import inspect
 import math
 from collections.abc import Callable, Iterator
+from pkgutil import resolve_name
 from types import NoneType, UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
-from hydra.utils import get_object
 from omegaconf import DictConfig
 
 LARGEST_INTEGER = 2**31 - 1
@@ -50,7 +50,7 @@ def check_values(config: DictConfig) -> None:
 
 def _arguments(node: DictConfig, path: str) -> Iterator[tuple[str, Any, Any]]:
     """Key, value and annotation of every argument that a class of the configuration is given."""
-    hints = _hints(get_object(node["_target_"])) if "_target_" in node else {}
+    hints = _hints(_target(node["_target_"], f"{path}_target_")) if "_target_" in node else {}
     for name in node:
         value, key = node[name], f"{path}{name!s}"
         if name in hints:
@@ -65,6 +65,14 @@ def _others(config: DictConfig) -> Iterator[tuple[str, Any, Any]]:
         for name in key.split("."):
             value = value[name]
         yield key, value, kind
+
+
+def _target(name: str, key: str) -> Callable[..., Any]:
+    try:
+        target: Callable[..., Any] = resolve_name(name)
+    except (ImportError, AttributeError) as error:
+        raise ValueError(f"{key}: '{name}' cannot be imported: {error}") from error
+    return target
 
 
 def _hints(target: Callable[..., Any]) -> dict[str, Any]:

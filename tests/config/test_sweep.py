@@ -11,7 +11,9 @@ from ngi.config.sweep import progress
 from ngi.config.sweep_plan import Planned, duration, table
 from tests.learn.command_line import SIZE, run
 
-PLACE = "hydra.sweep.subdir='${optimizer.lr}-${seed}'"  # names of their own would be long and cut
+PLACE = (
+    "run.folder='outputs/steps/${optimizer.lr}-${seed}'"  # names of their own would be long and cut
+)
 SWEEP = (*SIZE, "budget=steps", "budget.steps=12", "seed=0,1", "sampler=uniform", PLACE)
 
 
