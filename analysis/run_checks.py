@@ -135,7 +135,6 @@ def read_table(file: Path) -> pd.DataFrame:
     for column, values in table.select_dtypes(exclude="number").items():
         row = values.notna() & ~values.map(_fits)
         line = int(row.to_numpy().argmax())
-        raise ValueError(
-            f"{file.name}, line {line + 2}: {column} is {values.iloc[line]!r:.80}, which is no number"
-        )
+        found = f"{column} is {values.iloc[line]!r:.80}"
+        raise ValueError(f"{file.name}, line {line + 2}: {found}, which is no number")
     return table
