@@ -61,7 +61,7 @@ def planned_runs(config: DictConfig, loader: ConfigLoader) -> list[Planned]:
     if sweeper._target_ != f"{BasicSweeper.__module__}.{BasicSweeper.__name__}":
         return []
     words = [f"{key}={value}" for key, value in (sweeper.params or {}).items()]
-    words += OmegaConf.to_container(config.hydra.overrides.task, resolve=False)
+    words += config.hydra.overrides.task
     overrides = OverridesParser.create(config_loader=loader).parse_overrides(words)
     (jobs,) = BasicSweeper.split_arguments(overrides, max_batch_size=None)
     costs: dict[str, float | None] = {}
