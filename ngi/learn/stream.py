@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 import torch
-from torch.utils.data import IterableDataset
 
 from ngi.clock.counters import Counters
 from ngi.clock.phase_clock import PhaseClock
@@ -27,8 +26,7 @@ from ngi.learn.samples import Samples
 from ngi.reuse import Reuse
 
 ENDLESS = 2**31
-"""The length of a stream. Lightning prefetches one batch of a dataset without a length, and the
-sampler would run one step behind the network."""
+"""The length of a stream, in batches."""
 
 REFUSED_IN_A_ROW = 10
 """Batches with NaN or Inf after which the renderer, not a rare v, is to blame."""
@@ -36,7 +34,7 @@ REFUSED_IN_A_ROW = 10
 log = logging.getLogger(__name__)
 
 
-class TrainingStream(IterableDataset[Batch]):
+class TrainingStream:
     """Endless batches of `sampler.chains` samples.
 
     The chains propose at the first batch and at each that follows a generated one; patches have the
@@ -58,7 +56,6 @@ class TrainingStream(IterableDataset[Batch]):
         clock: PhaseClock,
         seed: int,
     ) -> None:
-        super().__init__()
         for iteration in (0, ENDLESS):
             samples.check_resolution(schedule.resolution(iteration))
         if reuse.store.capacity < 2 * sampler.chains:
@@ -91,9 +88,6 @@ class TrainingStream(IterableDataset[Batch]):
     def chains(self) -> ChainState:
         """Where the chains stand."""
         return self._chains
-
-    def __len__(self) -> int:
-        return ENDLESS
 
     def __iter__(self) -> Iterator[Batch]:
         while True:
