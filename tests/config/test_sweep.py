@@ -11,7 +11,7 @@ import pytest
 
 from ngi.config.sweep import progress
 from ngi.config.sweep_plan import Planned, duration, table
-from tests.learn.command_line import SIZE, environment, run
+from tests.learn.command_line import SIZE, SMALL, environment, run
 
 PLACE = (
     "run.folder='outputs/steps/${optimizer.lr}-${seed}'"  # names of their own would be long and cut
@@ -158,7 +158,7 @@ def test_a_bug_in_the_plan_of_a_dry_run_trains_nothing(
     tmp_path: Path, multirun: tuple[str, ...]
 ) -> None:
     ran = subprocess.run(
-        [sys.executable, "-c", BROKEN, *multirun, "--dry-run", *SIZE, "budget=steps", PLACE],
+        [sys.executable, "-c", BROKEN, *multirun, "--dry-run", *SMALL, PLACE],
         cwd=tmp_path,
         env=environment(tmp_path),
         capture_output=True,
