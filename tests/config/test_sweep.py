@@ -28,7 +28,7 @@ def rows(output: str) -> dict[str, list[str]]:
     found = {}
     for line in output.splitlines():
         if match := re.match(r"outputs/steps/(\S+)\s+(.*)", line):
-            found[match[1]] = re.split(r"\s{2,}", match[2].strip())
+            found[match[1]] = re.split(r"\s{2,}", match[2].strip())[:3]
     return found
 
 
@@ -48,6 +48,9 @@ def test_before_it_starts_its_runs_are_listed(finished: tuple[Path, str]) -> Non
         name: ["new", "0%", "?"] for name in ("0.001-0", "-1-0", "0.001-1", "-1-1")
     }
     assert "4 runs: 4 new; how long they take is not known" in before
+    words = re.findall(r"0%\s+\?\s+(.*)", before)
+    expected = [f"optimizer.lr={lr} seed={seed}" for lr in ("0.001", "-1") for seed in (0, 1)]
+    assert sorted(words) == sorted(expected)
 
 
 def test_a_line_says_how_far_it_is_after_every_run(finished: tuple[Path, str]) -> None:
