@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from hydra._internal.core_plugins.basic_sweeper import BasicSweeper
 from hydra.core.config_loader import ConfigLoader
@@ -61,7 +61,8 @@ def planned_runs(config: DictConfig, loader: ConfigLoader) -> list[Planned]:
     if sweeper._target_ != f"{BasicSweeper.__module__}.{BasicSweeper.__name__}":
         return []
     words = [f"{key}={value}" for key, value in (sweeper.params or {}).items()]
-    words += OmegaConf.to_container(config.hydra.overrides.task, resolve=False)
+    task = OmegaConf.to_container(config.hydra.overrides.task, resolve=False)
+    words += cast("list[str]", task)
     overrides = OverridesParser.create(config_loader=loader).parse_overrides(words)
     (jobs,) = BasicSweeper.split_arguments(overrides, max_batch_size=None)
     costs: dict[str, float | None] = {}
