@@ -10,7 +10,7 @@ import pytest
 import torch
 from omegaconf import DictConfig
 
-from ngi import costs as costs_command
+from ngi.commands import costs as costs_command
 from ngi.config.build import run_components
 from ngi.learn import CostFile, TrainingStream
 from ngi.machine.usage import COLUMNS

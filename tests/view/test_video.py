@@ -1,4 +1,4 @@
-"""`python -m ngi.video` on runs of closed formulas, as a user starts it."""
+"""`ngi video` on runs of closed formulas, as a user starts it."""
 
 import json
 import subprocess
@@ -12,8 +12,8 @@ import torch
 from numpy.typing import NDArray
 from PIL import Image
 
-from ngi.video import main
 from ngi.view import film
+from ngi.view.video import main
 from tests.learn.command_line import environment, run
 
 av = pytest.importorskip("av", reason="the extra 'video' is missing")
@@ -70,7 +70,7 @@ def test_frames_are_the_pictures_of_the_render_command(trained: Path) -> None:
     """Ten frames along the hard frames are these, which training has written, too."""
     options = ("run=run", "path=hard_frames", "seconds=10", "frames_per_second=1")
     done = subprocess.run(
-        [sys.executable, "-m", "ngi.video", *options, f"resolution={SIZE}"],
+        [sys.executable, "-m", "ngi", "video", *options, f"resolution={SIZE}"],
         capture_output=True,
         text=True,
         cwd=trained,
