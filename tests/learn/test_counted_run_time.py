@@ -165,7 +165,7 @@ def test_costs_decide_what_a_run_is_and_their_path_does_not(
 
 
 def test_what_is_not_measured_is_asked_for(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=r"costs\.json lacks 'training-.*python -m ngi\.costs"):
+    with pytest.raises(ValueError, match=r"costs\.json lacks 'training-.*`ngi costs`"):
         train(model_clock(tmp_path))
     assert not (tmp_path / "run").exists()
 
