@@ -62,9 +62,16 @@ def build_network(config: DictConfig, *, samples: Samples) -> nn.Module:
     """The network for these samples, its weights as they are before the first step."""
     from ngi import learn
 
-    network: nn.Module = learn.seeded(instantiate(config.model), seed=config.seed)(
-        layout=samples.layout, scene_dimensions=samples.network_dimensions
-    )
+    make = learn.seeded(instantiate(config.model), seed=config.seed)
+    try:
+        network: nn.Module = make(
+            layout=samples.layout, scene_dimensions=samples.network_dimensions
+        )
+    except TypeError as error:
+        raise ValueError(
+            f"model: {error}; a network takes layout, scene_dimensions and the keys of model, "
+            "among them hidden_features and hidden_layers, which budgets set"
+        ) from error
     return network
 
 

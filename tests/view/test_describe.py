@@ -28,7 +28,8 @@ ROOM = """<scene version="3.0.0">
   <rotate x="1" angle="-90"/></transform><ref id="paint"/></shape>
 <shape type="sphere" id="ball"><float name="radius" value="0.5"/><ref id="paint"/></shape>
 <shape type="rectangle" id="lamp"><transform name="to_world"><rotate x="1" angle="90"/>
-  <translate y="4"/></transform><emitter type="area"/></shape>
+  <translate y="4"/></transform><emitter type="area"/>
+  <bsdf type="diffuse" id="shade"><rgb name="reflectance" value="0.5"/></bsdf></shape>
 </scene>"""
 
 
@@ -150,6 +151,7 @@ def test_a_plain_file_becomes_a_variable_scene(room, capsys) -> None:
     text = capsys.readouterr().out
     assert "camera: look_at" in text
     assert "paint: albedo" in text
+    assert "shade: albedo" in text, "it stands inside its shape"
     assert "grey" not in text, "its reflectance is no colour"
     assert "ball: translation, rotation, scale, visibility" in text
     assert "lamp: translation, rotation, scale, intensity" in text
