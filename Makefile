@@ -23,7 +23,7 @@ demo: setup ## train ours, the paper's method and uniform sampling, compare them
 	$(BIN)/python -m analysis.report outputs/demo && exit $$status
 
 view: setup ## trained networks in the browser: SCENE=living-room|sphere-caustic|veach-egg
-	@$(BIN)/python -m ngi.view run=scenes/$(SCENE)/network
+	@$(BIN)/ngi view run=scenes/$(SCENE)/network
 
 test: setup lint smoke ## linter, type checker, all tests, smoke run on real renders
 	@sh tools/browser.sh

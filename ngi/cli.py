@@ -32,7 +32,7 @@ WAY = {
     ),
     "Look at a run": (
         Verb("view", "ngi.view.__main__", "in the browser, with a slider for every variable"),
-        Verb("render", "ngi.render.__main__", "one picture of any configuration, as PNG or EXR"),
+        Verb("render", "ngi.view.picture", "one picture of any configuration, as PNG or EXR"),
         Verb("video", "ngi.view.video", "a path through the scene, and how steady the network is"),
         Verb("export", "ngi.view.export", "the network as one ONNX file, for other programs"),
     ),

@@ -34,8 +34,6 @@ STOREYS = {
         for name in names
     },
 }
-ON_THE_COMMAND_LINE = ("ngi.render.__main__", "ngi.view.__main__")
-"""`python -m ngi.ROOM`: entry points, though they lie in a room."""
 
 WITH_MITSUBA = ("machine", "scene", "render", "denoise", "studies")
 """Who may use mitsuba and drjit, by way of `ngi.machine.backend`."""
@@ -91,8 +89,6 @@ def storey(module: str) -> int:
     """-1 for `ngi` itself, which holds the version and imports nothing."""
     if module == "ngi":
         return -1
-    if module in ON_THE_COMMAND_LINE:
-        return STOREYS[COMMANDS[0]]
     return STOREYS[module.split(".")[1]]
 
 

@@ -1,4 +1,4 @@
-"""`python -m ngi.render` on runs of closed formulas, as a user starts it."""
+"""`ngi render` on runs of closed formulas, as a user starts it."""
 
 import contextlib
 import io
@@ -34,7 +34,7 @@ def render(folder: Path, *options: str) -> tuple[int, str]:
 
 def render_as_users_do(folder: Path, *options: str) -> tuple[int, str]:
     done = subprocess.run(
-        [sys.executable, "-m", "ngi.render", "run=run", *options],
+        [sys.executable, "-m", "ngi", "render", "run=run", *options],
         capture_output=True,
         text=True,
         cwd=folder,
