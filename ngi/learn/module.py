@@ -126,6 +126,11 @@ class IlluminationModule(LightningModule):
             return self._scorer_of(target).signals(patches.to(self.device), self._optimizer())
 
     def _check_inputs(self, patches: Patches) -> None:
+        if not hasattr(self.network, "render"):
+            raise ValueError(
+                f"model: {type(self.network).__name__} has no method render(buffers, scene_vector)"
+                ", which makes the whole images that are evaluated and shown"
+            )
         inputs, _ = self._example(patches)
         takes = signature(self.network.forward)
         try:

@@ -1,4 +1,4 @@
-"""What one training sample is, and what of it the network is given."""
+"""Training samples: what is rendered for each, and the inputs that the network gets of it."""
 
 from __future__ import annotations
 
@@ -50,7 +50,10 @@ class Samples(Protocol):
         ...
 
     def rearranged(self, patches: Patches, generator: torch.Generator) -> Patches:
-        """Stored samples as they are trained on again: what of a sample is what may change."""
+        """Stored samples, prepared for being trained on again.
+
+        A sample of several images may choose anew which of them are the network's input.
+        """
         ...
 
     def example(self, patches: Patches) -> Example:
