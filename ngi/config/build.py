@@ -62,10 +62,7 @@ def build_network(config: DictConfig, *, samples: Samples) -> nn.Module:
     """The network for these samples, its weights as they are before the first step."""
     from ngi import learn
 
-    network: nn.Module = learn.seeded(instantiate(config.model), seed=config.seed)(
-        layout=samples.layout, scene_dimensions=samples.network_dimensions
-    )
-    return network
+    return learn.network_of(samples, learn.seeded(instantiate(config.model), seed=config.seed))
 
 
 def build_module(
