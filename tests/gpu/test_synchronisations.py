@@ -1,0 +1,49 @@
+"""How often the host waits for the GPU in a training step, and where."""
+
+from collections import Counter
+from itertools import islice
+from pathlib import Path
+
+import pytest
+
+from ngi.explore import Loss, LossTimesOutputGradient, LossTimesStep, Target
+from ngi.learn import IlluminationModule, StepGuard, patch_example, seeded, training_step
+from ngi.models import L1Dssim, MuonAdam, PixelGenerator
+from ngi.render import AnalyticRenderer
+from tests.gpu.pretended import Ledger
+from tests.learn.small_stream import make
+
+
+def waits(folder: Path, ledger: Ledger, target: Target) -> dict[bool, list[Counter[str]]]:
+    """By file, in each step after the first four; of generated batches and of stored ones."""
+    stream = make(folder, target=target)
+    module = IlluminationModule(
+        network=seeded(PixelGenerator, seed=0)(
+            layout=AnalyticRenderer(dimensions=3, patch_size=8).layout,
+            scene_dimensions=3,
+            hidden_features=12,
+            hidden_layers=2,
+        ),
+        loss=L1Dssim(l1_weight=1.0, dssim_weight=1.0, window_size=5),
+        optimizer=MuonAdam,
+        example=patch_example,
+        stream=stream,
+        guard=StepGuard(stream=stream, folder=folder),
+    ).to("cuda")
+    optimizer = module.configure_optimizers()
+    found: dict[bool, list[Counter[str]]] = {True: [], False: []}
+    for number, batch in enumerate(islice(stream, 16)):
+        ledger.clear()
+        training_step(batch.to("cuda"), module.learner, optimizer=optimizer)
+        by_file = Counter[str]()
+        for place, count in ledger.waits.items():
+            by_file[place.partition(":")[0]] += count
+        if number >= 4:
+            found[batch.generated].append(by_file)
+    return found
+
+
+@pytest.mark.parametrize("target", [Loss(), LossTimesStep(), LossTimesOutputGradient()])
+def test_counts(gpu: Ledger, tmp_path: Path, target: Target) -> None:
+    found = waits(tmp_path, gpu, target)
+    print(found)
