@@ -44,6 +44,7 @@ WAY = {
         Verb("costs", "ngi.costs", "what steps cost here, to count run time fairly when training"),
         Verb("metrics", "ngi.metrics", "metrics again, from a run's linear pictures"),
         Verb("benchmark", "ngi.benchmark", "how fast every part of the program is"),
+        Verb("gpu-check", "ngi.gpu_check", "everything there is to find out on a GPU, in parts"),
         Verb("stability", "ngi.stability", "what becomes of extreme and stiff cases"),
     ),
 }

@@ -23,7 +23,7 @@ COMMANDS = ("train", "costs", "metrics", "video", "export", "doctor")
 STUDIES = ("studies",)
 """What measures the program: it may import everything above."""
 
-DOORS = ("benchmark", "exploration_map", "stability", "cli", "__main__")
+DOORS = ("benchmark", "exploration_map", "gpu_check", "stability", "cli", "__main__")
 """What opens the studies to the command line, and the command line itself."""
 
 STOREYS = {
@@ -150,7 +150,8 @@ def test_the_program_knows_neither_studies_nor_tests() -> None:
         for name, file in files.items()
         if starts_with(set(imports(file)), "ngi.studies") and not name.startswith("ngi.studies")
     }
-    assert measuring == {"ngi.benchmark", "ngi.exploration_map", "ngi.stability"}
+    doors = ("benchmark", "exploration_map", "gpu_check", "stability")
+    assert measuring == {f"ngi.{door}" for door in doors}
     assert not {n for n, file in files.items() if starts_with(set(imports(file)), "tests")}
 
 

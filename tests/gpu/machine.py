@@ -56,6 +56,7 @@ def pretended_gpu() -> Iterator[Ledger]:
         patch.setattr(torch.__future__, "_swap_module_params_on_conversion", True)
         LEDGER.clear()
         yield LEDGER
+    torch.use_deterministic_algorithms(False)  # `make_repeatable` switches it on
 
 
 def _patch_moves(monkeypatch: pytest.MonkeyPatch) -> None:

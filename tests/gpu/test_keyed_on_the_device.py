@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 import torch
+from hydra.utils import instantiate
 
 from ngi.clock.costs import components
 from ngi.config.build import plain

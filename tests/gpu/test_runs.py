@@ -46,6 +46,19 @@ RUNS = {
 }
 
 
+NOT_REPEATABLE = {
+    *("adaptive_avg_pool2d_backward", "adaptive_max_pool2d_backward", "avg_pool3d_backward"),
+    *("max_pool2d_with_indices_backward", "max_unpool2d", "fractional_max_pool2d_backward"),
+    *("upsample_linear1d_backward", "upsample_bilinear2d_backward", "grid_sampler_2d_backward"),
+    *("upsample_bicubic2d_backward", "upsample_trilinear3d_backward", "put_", "histc", "cumsum"),
+    *("reflection_pad1d_backward", "reflection_pad2d_backward", "reflection_pad3d_backward"),
+    *("nll_loss_forward", "nll_loss2d_forward", "_ctc_loss_backward", "bincount", "median"),
+    *("kthvalue", "cumprod", "_embedding_bag_backward"),
+}
+"""Operators without a deterministic algorithm on CUDA: what `use_deterministic_algorithms` raises
+for, by its documentation and by the calls of `alertNotDeterministic` in PyTorch's sources."""
+
+
 def trained(folder: Path, *overrides: str) -> dict[str, Any]:
     """The result of a run in `folder`/run, on the GPU where one seems to be there."""
     return train(
@@ -78,6 +91,8 @@ def test_a_run_on_the_gpu_is_that_on_the_cpu(tmp_path: Path, name: str) -> None:
     trained(tmp_path / "cpu", *RUNS[name])
     with pretended_gpu() as ledger:
         result = trained(tmp_path / "gpu", *RUNS[name])
+        assert torch.are_deterministic_algorithms_enabled()
     assert ledger.launches.total() > 1000
+    assert not {operator.split(".")[1] for operator in ledger.launches} & NOT_REPEATABLE
     assert result["machine"]["gpu"] == NAME
     assert_close(tmp_path / "cpu", tmp_path / "gpu")
