@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 import torch
 from torch import Tensor
+from torch.nn.utils import clip_grad
 
 from ngi.render.closed_form import ClosedFormRenderer
 from ngi.render.protocol import RenderedPatches
@@ -52,6 +53,7 @@ def pretended_gpu() -> Iterator[Ledger]:
         _patch_constants(patch)
         _patch_autocast(patch)
         _patch_renderers(patch)
+        _patch_grouping(patch)
         # A module that moves would write into its parameters' memory, of which `OnGpu` has none.
         patch.setattr(torch.__future__, "_swap_module_params_on_conversion", True)
         LEDGER.clear()
@@ -134,3 +136,16 @@ def _patch_renderers(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ClosedFormRenderer, "render_patches", patches_on_gpu)
     for name in ("render_image", "image_buffers"):
         monkeypatch.setattr(ClosedFormRenderer, name, on_gpu(getattr(ClosedFormRenderer, name)))
+
+
+def _patch_grouping(monkeypatch: pytest.MonkeyPatch) -> None:
+    """C++ groups gradients by the device that it takes them to be on."""
+    group = clip_grad._group_tensors_by_device_and_dtype
+
+    def grouped(lists: list[list[Tensor]], *rest: Any) -> dict[tuple[Any, Any], Any]:
+        return {
+            (members[0][0].device, dtype): (members, indices)
+            for (_, dtype), (members, indices) in group(lists, *rest).items()
+        }
+
+    monkeypatch.setattr(clip_grad, "_group_tensors_by_device_and_dtype", grouped)

@@ -96,6 +96,7 @@ def test_one_that_goes_on_is_begun_as_often_as_it_is_cut_off(tmp_path: Path) -> 
         with pytest.raises(KeyboardInterrupt):
             checked(tmp_path, item)
     assert checked(tmp_path, item).to_do([item]) == []
+    assert measure.calls == 6
 
 
 def test_nothing_is_begun_that_may_not_end_in_time(tmp_path: Path) -> None:
