@@ -8,7 +8,9 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from analysis.chain_trace import read_chain_trace
@@ -126,31 +128,14 @@ def _histograms(runs: Sequence[Run], plane: str) -> Figure:
         method: [(_relative(w.density), _relative(w.counts.sum(axis=0))) for w in found]
         for method, found in shown.items()
     }
-    kinds = ("target density", "chains' states")
-    tops = [
-        np.quantile([pair[kind] for pairs in pictures.values() for pair in pairs], BRIGHTEST)
-        for kind in range(len(kinds))
-    ]
     images = {}
-    for index, (method, pairs) in enumerate(pictures.items()):
-        for row, kind in enumerate(kinds):
-            for column, axes in enumerate(rows[2 * index + row]):
-                axes.grid(False)
-                if column >= len(pairs):
-                    axes.axis("off")
-                    continue
-                images[kind] = axes.imshow(
-                    pairs[column][row].T,  # the first variable goes to the right
-                    origin="lower",
-                    extent=(0, 1, 0, 1),
-                    vmin=0,
-                    vmax=tops[row],
-                    cmap="inferno",
-                    aspect="equal",
-                )
-                if row == 0:
-                    axes.set_title(f"step {shown[method][column].step:,}", fontsize=8)
-            rows[2 * index + row][0].set_ylabel(f"{title(method)}\n{kind}\n{up}", fontsize=8)
+    for row, kind in enumerate(("target density", "chains' states")):
+        top = np.quantile([pair[row] for pairs in pictures.values() for pair in pairs], BRIGHTEST)
+        for line, (method, pairs) in zip(rows[row::2], pictures.items(), strict=True):
+            images[kind] = _maps(line, [pair[row] for pair in pairs], top=float(top))
+            line[0].set_ylabel(f"{title(method)}\n{kind}\n{up}", fontsize=8)
+            for axes, window in zip(line, shown[method] if row == 0 else [], strict=False):
+                axes.set_title(f"step {window.step:,}", fontsize=8)
     for axes in rows[-1]:
         axes.set_xlabel(across)
         axes.set(xticks=(0, 0.5, 1), yticks=(0, 0.5, 1))
@@ -163,6 +148,24 @@ def _histograms(runs: Sequence[Run], plane: str) -> Figure:
         fontsize=10,
     )
     return figure
+
+
+def _maps(line: Sequence[Axes], densities: Sequence[np.ndarray], *, top: float) -> AxesImage:
+    """Draws one density beside the other, and returns the last for its colour scale."""
+    for axes, density in zip(line, densities, strict=False):
+        axes.grid(False)
+        image = axes.imshow(
+            density.T,  # the first variable goes to the right
+            origin="lower",
+            extent=(0, 1, 0, 1),
+            vmin=0,
+            vmax=top,
+            cmap="inferno",
+            aspect="equal",
+        )
+    for axes in line[len(densities) :]:
+        axes.axis("off")
+    return image
 
 
 def _evenly(found: Sequence[Window]) -> list[Window]:

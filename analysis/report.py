@@ -64,15 +64,10 @@ def write_report(folder: Path, output: Path) -> Report:
     doubts = comparison_warnings(runs) + ways_left_out(runs)
     summaries, styles = summarise(runs), method_styles(runs)
     comparisons, claims = compare(summaries), judge(runs)
-    tables = [error_table(summaries), worst_table(summaries), cost_table(summaries)]
-    if comparisons:
-        tables.append(comparison_table(comparisons))
-    if (frames := frame_table(runs)).rows:
-        tables.append(frames)
-    if (found := claims_table(claims)).rows:
-        tables.insert(0, found)
     films, unreadable = film_tables(folder, runs)
-    tables += films
+    found, frames = claims_table(claims), frame_table(runs)
+    tables = [found, error_table(summaries), worst_table(summaries), cost_table(summaries)]
+    tables += [comparison_table(comparisons), frames, *films]
     warnings += unreadable
     output.mkdir(parents=True, exist_ok=True)
     files = _write_tables(tables, runs, summaries, doubts, output)
@@ -121,10 +116,11 @@ def _write_tables(
     provenance = output / "provenance.csv"
     to_frame(summaries).to_csv(csv, index=False)
     provenance_frame(runs).to_csv(provenance, index=False)
+    filled = [table for table in tables if table.rows]
     lines = [*_notes(runs), *(f"Warning: {doubt}" for doubt in doubts)]
     notes = "\n".join(f"- {line}" for line in lines)
-    markdown.write_text("\n\n".join([*map(to_markdown, tables), notes]) + "\n")
-    latex.write_text("\n\n".join(map(to_latex, tables)) + "\n")
+    markdown.write_text("\n\n".join([*map(to_markdown, filled), notes]) + "\n")
+    latex.write_text("\n\n".join(map(to_latex, filled)) + "\n")
     return [csv, markdown, latex, provenance]
 
 

@@ -177,6 +177,14 @@ def _main(config: DictConfig) -> None:
     )
 
 
+@hydra.main(version_base="1.3", config_path=str(root() / "conf"), config_name="train")
+def _train_nothing(config: DictConfig) -> None:
+    """The job of a dry run, which ends before there is one."""
+    fail(
+        RuntimeError(f"{DRY_RUN}: nothing is trained, and no plan was made"), job=config.run.folder
+    )
+
+
 DRY_RUN = "--dry-run"
 """Word of the command line: shows what would run, and runs nothing."""
 
@@ -186,9 +194,10 @@ SWEEP = "+hydra.callbacks.sweep={{_target_:ngi.config.sweep.Sweep,dry_run:{}}}"
 def main() -> None:
     """Entry point of `ngi train` and `python -m ngi.train`."""
     register()
+    dry_run = DRY_RUN in sys.argv
     words = [word for word in sys.argv[1:] if word != DRY_RUN]
-    sys.argv[1:] = with_overrides(completed(words), SWEEP.format(str(DRY_RUN in sys.argv).lower()))
-    run_program(_main)
+    sys.argv[1:] = with_overrides(completed(words), SWEEP.format(str(dry_run).lower()))
+    run_program(_train_nothing if dry_run else _main)
 
 
 if __name__ == "__main__":

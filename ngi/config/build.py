@@ -40,18 +40,21 @@ def build_stream(
     config: DictConfig, *, samples: Samples, clock: PhaseClock, patches: Path
 ) -> TrainingStream:
     """The stream of training batches. patches: folder that its store is archived in."""
-    from ngi import learn
+    from ngi.learn import TrainingStream
+    from ngi.reuse import PatchArchive, Reuse
 
-    return learn.TrainingStream(
+    return TrainingStream(
         samples=samples,
         sampler=instantiate(config.sampler),
-        store=instantiate(config.reuse.store)(layout=samples.layout),
-        archive=learn.PatchArchive(patches),
-        policy=instantiate(config.reuse.policy),
+        reuse=Reuse(
+            store=instantiate(config.reuse.store)(layout=samples.layout),
+            archive=PatchArchive(patches),
+            policy=instantiate(config.reuse.policy),
+            when_late=config.reuse.when_late,
+        ),
         schedule=instantiate(config.resolution),
         clock=clock,
         seed=config.seed,
-        when_late=config.reuse.when_late,
     )
 
 

@@ -12,9 +12,11 @@ import os
 import shutil
 import sys
 import time
-from collections.abc import Sequence
+import traceback
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from hydra.core.global_hydra import GlobalHydra
 from hydra.core.utils import JobReturn, JobStatus
@@ -33,9 +35,12 @@ from ngi.config.sweep_plan import (
     table,
 )
 
+NOT_COMPOSED = (HydraException, OmegaConfBaseException)
+"""What is raised where the configuration of a job cannot be put together."""
+
 
 class Sweep(Callback):
-    """dry_run: whether the table is all that is wanted; Ends the program with status 0 then, or
+    """dry_run: whether the table is all that is wanted; ends the program with status 0 then, or
     with 1 where a run cannot start.
     """
 
@@ -47,19 +52,19 @@ class Sweep(Callback):
 
     def on_run_start(self, config: DictConfig, **_: Any) -> None:
         if self._dry_run:
-            _show_and_exit([planned_run(config, {})])
+            _show_and_exit(lambda: [planned_run(config, {})])
 
     def on_multirun_start(self, config: DictConfig, **_: Any) -> None:
-        runs = self._planned(config)
         if self._dry_run:
-            _show_and_exit(runs)
-        if runs:
-            print(table(runs), flush=True)
-        self._runs = runs
+            _show_and_exit(lambda: _planned(config))
         self._begun = time.time()
         self._notes = Path(config.hydra.sweep.dir, f".sweep-{os.getpid()}").resolve()
         self._notes.mkdir(parents=True)
         atexit.register(self._end)
+        with suppress(*NOT_COMPOSED):  # Hydra will say what is wrong
+            self._runs = _planned(config)
+        if self._runs:
+            print(table(self._runs), flush=True)
 
     def on_job_end(self, config: DictConfig, job_return: JobReturn, **_: Any) -> None:
         if self._notes is None or not self._notes.is_dir():
@@ -71,15 +76,6 @@ class Sweep(Callback):
             failed = sum(note["failure"] is not None for note in ended.values())
             elapsed = time.time() - self._begun
             print(progress(self._runs, [*ended], failed, elapsed), file=sys.stderr, flush=True)
-
-    def _planned(self, config: DictConfig) -> list[Planned]:
-        """None of a sweeper that chooses its runs as it goes, and where Hydra will say why not."""
-        try:
-            return planned_runs(config, GlobalHydra.instance().config_loader())
-        except (HydraException, OmegaConfBaseException) as error:
-            if self._dry_run:
-                sys.exit(str(error))
-            return []
 
     def _ended(self) -> dict[int, dict[str, Any]]:
         """Notes of runs that have ended, in whatever process, by their number."""
@@ -124,8 +120,21 @@ def _failure(job: JobReturn) -> str | None:
     return (str(cause).splitlines() or [type(cause).__name__])[0]
 
 
-def _show_and_exit(runs: Sequence[Planned]) -> None:
-    if not runs:
-        sys.exit("--dry-run: this sweeper chooses its runs as it goes; there is no plan to show")
-    print(table(runs))
+def _planned(config: DictConfig) -> list[Planned]:
+    """None of a sweeper that chooses its runs as it goes."""
+    return planned_runs(config, GlobalHydra.instance().config_loader())
+
+
+def _show_and_exit(plan: Callable[[], Sequence[Planned]]) -> NoReturn:
+    """Does not return whatever happens: Hydra answers an exception with a warning, and trains."""
+    try:
+        runs = plan()
+        if not runs:
+            sys.exit("--dry-run: this sweeper chooses its runs as it goes; there is no plan")
+        print(table(runs))
+    except NOT_COMPOSED as error:
+        sys.exit(str(error))
+    except Exception:
+        traceback.print_exc()
+        sys.exit("--dry-run: this is a bug; nothing was trained")
     sys.exit(int(any(run.state.startswith("cannot") for run in runs)))

@@ -24,6 +24,7 @@ from tqdm import tqdm
 from ngi.clock.counters import Counters
 from ngi.config.build import plain, run_components
 from ngi.config.configuration import run_settings
+from ngi.config.hydra_program import MESSAGES
 from ngi.files.code_versions import code_version, code_versions, same_program
 from ngi.files.row_log import RowLog
 from ngi.files.run_folder import longer
@@ -61,7 +62,8 @@ def planned_runs(config: DictConfig, loader: ConfigLoader) -> list[Planned]:
     if sweeper._target_ != f"{BasicSweeper.__module__}.{BasicSweeper.__name__}":
         return []
     words = [f"{key}={value}" for key, value in (sweeper.params or {}).items()]
-    words += OmegaConf.to_container(config.hydra.overrides.task, resolve=False)
+    given: Any = OmegaConf.to_container(config.hydra.overrides.task, resolve=False)
+    words += given
     overrides = OverridesParser.create(config_loader=loader).parse_overrides(words)
     (jobs,) = BasicSweeper.split_arguments(overrides, max_batch_size=None)
     costs: dict[str, float | None] = {}
@@ -81,7 +83,7 @@ def planned_run(config: DictConfig, costs: dict[str, float | None]) -> Planned:
         state = _state(config, folder)
         done = _done(folder, budget) if state in ("interrupted", "longer") else 0.0
         left = 0.0 if "path_tracing" in config else _left(config, budget, done, costs)
-    except (HydraException, OmegaConfBaseException, ValueError, OSError) as error:
+    except (*MESSAGES, HydraException, OmegaConfBaseException) as error:
         cause = error.__cause__ or error
         return Planned(folder, f"cannot start: {str(cause).splitlines()[0]}", 0.0, None)
     if state == "finished":
@@ -95,7 +97,11 @@ def _state(config: DictConfig, folder: Path) -> str:
     if not any(file.exists() for file in made):
         return "new"
     there = json.loads((folder / "settings.json").read_text())
-    ours = run_settings(config, scene_hash=there["scene"]["hash"], costs=there["costs"])
+    try:
+        known = {"scene_hash": there["scene"]["hash"], "costs": there["costs"]}
+    except (KeyError, TypeError):
+        raise ValueError(f"{folder / 'settings.json'} is no run's; delete the folder") from None
+    ours = run_settings(config, **known)
     is_longer = longer(ours, than=there)
     if ours != there and not is_longer:
         raise ValueError("its folder holds another run; choose one with run.folder=…, or delete it")

@@ -175,16 +175,7 @@ class MarkovChains:
         patch_ids = self._per_chain("patch_ids", patch_ids, state)
         if (patch_ids < 0).any():
             raise ValueError(f"patch_ids: {patch_ids.tolist()}: give the ids of stored patches")
-        if target_current is not None:
-            current = self._per_chain("target_current", target_current, state).double()
-        elif self.needs_current:
-            raise ValueError(
-                f"target_current: None: {type(self.acceptance).__name__} acceptance needs the "
-                "targets of the current states"
-            )
-        else:
-            current = torch.zeros_like(proposed)
-
+        current = self._current(target_current, state)
         comparable = proposed.isfinite()
         free = ~state.occupied | ~current.isfinite()
         chosen = self.acceptance(
@@ -203,6 +194,17 @@ class MarkovChains:
             age=moved.age,
         )
         return moved, info
+
+    def _current(self, target: Tensor | None, state: ChainState) -> Tensor:
+        """[n] float64, targets of the current states; zeros where nobody needs them."""
+        if target is not None:
+            return self._per_chain("target_current", target, state).double()
+        if self.needs_current:
+            raise ValueError(
+                f"target_current: None: {type(self.acceptance).__name__} acceptance needs the "
+                "targets of the current states"
+            )
+        return torch.zeros_like(state.patch, dtype=torch.float64)
 
     def _per_chain(self, name: str, values: Tensor, state: ChainState) -> Tensor:
         if values.shape != (self.chains,):

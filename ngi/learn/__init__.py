@@ -32,7 +32,6 @@ from ngi.learn.stream import TrainingStream
 from ngi.learn.target_map import TargetMap
 from ngi.learn.tracker import Local, Tracker
 from ngi.learn.wandb_tracker import WeightsAndBiases
-from ngi.reuse import PatchArchive
 
 __all__ = [
     "LARGEST_NORM",
@@ -55,7 +54,6 @@ __all__ = [
     "Local",
     "MLflow",
     "ModelClock",
-    "PatchArchive",
     "PatchSamples",
     "PhaseClock",
     "RecordLog",

@@ -58,18 +58,6 @@ class AtomicCheckpointIO(TorchCheckpointIO):
         content = {**checkpoint, IDENTITY: self._identity}
         write_atomically(Path(path), checkpoint_bytes(content), keep_old_as=self._previous)
 
-    def load_checkpoint(self, *arguments: Any, **options: Any) -> dict[str, Any]:
-        """Also one whose steps Lightning's automatic optimisation counted, before 0.2.0 was out."""
-        checkpoint: dict[str, Any] = super().load_checkpoint(*arguments, **options)
-        callbacks = checkpoint["callbacks"]
-        if "StepGuard" in callbacks:
-            checkpoint[STEP_GUARD] = callbacks.pop("StepGuard")
-            callbacks["StepLog"] = callbacks.pop("SamplerFeedback")
-            loop = checkpoint["loops"]["fit_loop"]
-            steps = loop["epoch_loop.automatic_optimization.optim_progress"]["optimizer"]["step"]
-            loop["epoch_loop.manual_optimization.optim_step_progress"] = steps
-        return checkpoint
-
 
 def prepare_resume(folder: RunFolder) -> Path | None:
     """The checkpoint to go on from, or None for a fresh start; cuts the logs back to it.

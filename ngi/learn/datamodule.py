@@ -2,13 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
-
-from torch.utils.data import DataLoader
 
 from ngi.learn.batch import Batch
 from ngi.learn.lightning_api import LightningDataModule
-from ngi.learn.stream import TrainingStream
+from ngi.learn.stream import ENDLESS, TrainingStream
+
+
+class EndlessBatches:
+    """The stream's batches, with a length: without one, Lightning fetches a batch ahead.
+
+    The sampler would run one step behind the network.
+    """
+
+    def __init__(self, stream: TrainingStream) -> None:
+        self._stream = stream
+
+    def __iter__(self) -> Iterator[Batch]:
+        return iter(self._stream)
+
+    def __len__(self) -> int:
+        return ENDLESS
 
 
 class ExplorationDataModule(LightningDataModule):
@@ -18,9 +33,8 @@ class ExplorationDataModule(LightningDataModule):
         super().__init__()
         self.stream = stream
 
-    def train_dataloader(self) -> DataLoader[Batch]:
-        # Batches come ready-made, in this process: a worker would run ahead of the network.
-        return DataLoader(self.stream, batch_size=None, num_workers=0)
+    def train_dataloader(self) -> EndlessBatches:
+        return EndlessBatches(self.stream)
 
     def state_dict(self) -> dict[str, Any]:
         return self.stream.state_dict()

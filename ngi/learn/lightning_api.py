@@ -15,9 +15,6 @@ from lightning.pytorch.plugins.io import TorchCheckpointIO  # noqa: E402
 
 # Lightning announces hardware, tips and stops at every run; ours are in result.json and the log.
 logging.getLogger("lightning.pytorch").setLevel(logging.WARNING)
-# The stream has a length on purpose (see ngi.learn.stream.ENDLESS) and no worker processes.
-warnings.filterwarnings("ignore", message="Your `IterableDataset` has `__len__` defined")
-warnings.filterwarnings("ignore", message=".*does not have many workers")
 # Resuming in the middle of the endless epoch is what datamodule and stream are made for; that it
 # is exact is tested (tests/learn/test_resume.py).
 warnings.filterwarnings("ignore", message=".*your dataloader is not resumable")

@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 import torch
-from torch.utils.data import IterableDataset
 
 from ngi.clock.counters import Counters
 from ngi.clock.phase_clock import PhaseClock
@@ -24,13 +23,10 @@ from ngi.learn.ahead import ProposalsAhead
 from ngi.learn.batch import Batch, Feedback
 from ngi.learn.chain_trace import chain_record
 from ngi.learn.samples import Samples
-from ngi.reuse import PatchArchive, PatchStore, ReusePolicy
+from ngi.reuse import Reuse
 
 ENDLESS = 2**31
-"""The length of a stream. Lightning prefetches one batch of a dataset without a length, and the
-sampler would run one step behind the network."""
-
-WHEN_LATE = ("wait", "reuse")
+"""The length of a stream, in batches."""
 
 REFUSED_IN_A_ROW = 10
 """Batches with NaN or Inf after which the renderer, not a rare v, is to blame."""
@@ -38,7 +34,7 @@ REFUSED_IN_A_ROW = 10
 log = logging.getLogger(__name__)
 
 
-class TrainingStream(IterableDataset[Batch]):
+class TrainingStream:
     """Endless batches of `sampler.chains` samples.
 
     The chains propose at the first batch and at each that follows a generated one; patches have the
@@ -46,11 +42,8 @@ class TrainingStream(IterableDataset[Batch]):
 
     seed: the same seed gives the same batches on the same machine, also across a resume, and
         wherever the patches are rendered.
-    when_late: what to do where a new batch is due that is not rendered yet: 'wait' for it, or
-        'reuse' stored patches until it is, which makes the batches depend on the machine's speed.
-        Where the policy would never reuse, as in the bootstrap, it is waited for all the same.
-    Raises ValueError where samples cannot be cut from the schedule's first or last image, where
-    the store is smaller than two batches, and for an unknown `when_late`.
+    Raises ValueError where samples cannot be cut from the schedule's first or last image, and
+    where the store is smaller than two batches.
     """
 
     def __init__(
@@ -58,42 +51,33 @@ class TrainingStream(IterableDataset[Batch]):
         *,
         samples: Samples,
         sampler: Sampler,
-        store: PatchStore,
-        archive: PatchArchive,
-        policy: ReusePolicy,
+        reuse: Reuse,
         schedule: ResolutionSchedule,
         clock: PhaseClock,
         seed: int,
-        when_late: str,
     ) -> None:
-        super().__init__()
         for iteration in (0, ENDLESS):
             samples.check_resolution(schedule.resolution(iteration))
-        if store.capacity < 2 * sampler.chains:
+        if reuse.store.capacity < 2 * sampler.chains:
             raise ValueError(
-                f"reuse.store.capacity: {store.capacity} patches do not hold the chains' current "
-                f"states and a new batch; expected at least {2 * sampler.chains}"
-            )
-        if when_late not in WHEN_LATE:
-            raise ValueError(
-                f"reuse.when_late: '{when_late}'; expected one of {list(WHEN_LATE)}: wait for "
-                "patches that are not rendered yet, or train on stored ones until they are"
+                f"reuse.store.capacity: {reuse.store.capacity} patches do not hold the chains' "
+                f"current states and a new batch; expected at least {2 * sampler.chains}"
             )
         self.sampler = sampler
-        self.store = store
+        self.store = reuse.store
         self.clock = clock
         self.counters = Counters()
         self.reuse_probability = 0.0
         self.chain_record: dict[str, np.ndarray] | None = None  # of a generated batch
         self._chain_info: ChainInfo | None = None
         self._samples = samples
-        self._archive = archive
-        self._policy = policy
+        self._archive = reuse.archive
+        self._policy = reuse.policy
         self._schedule = schedule
-        self._when_late = when_late
+        self._when_late = reuse.when_late
         self._generator = torch.Generator().manual_seed(seed)
         self._chains: ChainState = sampler.init(samples.dimensions + 2)
-        self._policy_state = policy.init()
+        self._policy_state = reuse.policy.init()
         self._resolution = schedule.resolution(0)  # of the latest proposals
         self._ahead: ProposalsAhead | None = None
         self._saved_stores: list[dict[str, Any]] = []  # of the last two checkpoints
@@ -104,9 +88,6 @@ class TrainingStream(IterableDataset[Batch]):
     def chains(self) -> ChainState:
         """Where the chains stand."""
         return self._chains
-
-    def __len__(self) -> int:
-        return ENDLESS
 
     def __iter__(self) -> Iterator[Batch]:
         while True:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import gc
 import logging
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from ngi.machine.backend import activate, describe, mi
-from ngi.render.first_hit import first_hit_of
+from ngi.render.first_hit import FirstHit, first_hit_of
 from ngi.render.fitting import FittingTracer
 from ngi.render.jit_tracer import JitTracer, free_memory
 from ngi.render.launches import SAMPLES_PER_PASS, bands, passes
@@ -86,26 +87,9 @@ class MitsubaRenderer:
         )
         buffer_samples = buffer_samples or BUFFER_SAMPLES[self._variant]
         self.buffer_samples = buffer_samples
-        loaded = self._scene.scene
-        self._patch_tracer: Tracer
-        self._image_tracer: Tracer
-        if self._variant == "scalar_rgb":
-            self._patch_tracer = self._image_tracer = ScalarTracer(
-                scene=loaded, first_hit=first_hit, buffer_samples=buffer_samples
-            )
-        else:
-            self._patch_tracer, self._image_tracer = (
-                FittingTracer(
-                    JitTracer(
-                        scene=loaded,
-                        first_hit=first_hit,
-                        buffer_samples=buffer_samples,
-                        frozen=frozen,
-                    ),
-                    free=free_memory,
-                )
-                for frozen in (True, False)
-            )
+        self._patch_tracer, self._image_tracer = _tracers(
+            self._variant, self._scene.scene, first_hit, buffer_samples
+        )
         self.layout = first_hit.layout
         self._static = needed_only and buffers_are_static(self._scene, self.layout)
         self._static_buffers: dict[int, Tensor] = {}
@@ -267,6 +251,22 @@ class MitsubaRenderer:
                 f"{path}: the film is {width} x {height}; make width and height equal, since the "
                 "virtual image is a square"
             )
+
+
+def _tracers(
+    variant: str, scene: mi.Scene, first_hit: FirstHit, buffer_samples: int
+) -> tuple[Tracer, Tracer]:
+    """That of patches, whose launches are recorded once, and that of whole images."""
+    parts: dict[str, Any] = {
+        "scene": scene,
+        "first_hit": first_hit,
+        "buffer_samples": buffer_samples,
+    }
+    if variant == "scalar_rgb":
+        tracer = ScalarTracer(**parts)
+        return tracer, tracer
+    recorded, direct = (JitTracer(**parts, frozen=frozen) for frozen in (True, False))
+    return FittingTracer(recorded, free=free_memory), FittingTracer(direct, free=free_memory)
 
 
 def _finite(*tensors: Tensor) -> bool:

@@ -14,6 +14,7 @@ from ngi.reuse.policies import (
     SelfTuning,
     UntilFull,
 )
+from ngi.reuse.reuse import Reuse
 from ngi.reuse.store import PatchStore
 
 __all__ = [
@@ -27,6 +28,7 @@ __all__ = [
     "PolicyState",
     "Prioritised",
     "ProportionalToLoss",
+    "Reuse",
     "ReusePolicy",
     "SelfTuning",
     "UntilFull",

@@ -3,13 +3,15 @@
 import json
 import re
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from ngi.config.sweep import progress
 from ngi.config.sweep_plan import Planned, duration, table
-from tests.learn.command_line import SIZE, run
+from tests.learn.command_line import SIZE, environment, run
 
 PLACE = (
     "run.folder='outputs/steps/${optimizer.lr}-${seed}'"  # names of their own would be long and cut
@@ -137,6 +139,57 @@ def test_steps_take_what_they_were_measured_to_cost(tmp_path: Path) -> None:
     )
     assert status == 0, output
     assert "1 run: 1 new; at most 6:40 of training left" in output
+
+
+BROKEN = """
+import ngi.config.sweep as sweep
+import ngi.train
+
+def broken(*_):
+    raise KeyError("a bug of the plan")
+
+sweep.planned_runs = sweep.planned_run = broken
+ngi.train.main()
+"""
+
+
+@pytest.mark.parametrize("multirun", [("-m",), ()], ids=["sweep", "one run"])
+def test_a_bug_in_the_plan_of_a_dry_run_trains_nothing(
+    tmp_path: Path, multirun: tuple[str, ...]
+) -> None:
+    ran = subprocess.run(
+        [sys.executable, "-c", BROKEN, *multirun, "--dry-run", *SIZE, "budget=steps", PLACE],
+        cwd=tmp_path,
+        env=environment(tmp_path),
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert ran.returncode == 1, ran.stderr
+    assert "a bug of the plan" in ran.stderr
+    assert "this is a bug; nothing was trained" in ran.stderr
+    assert "Launching" not in ran.stdout
+    assert not (tmp_path / "outputs").exists()
+
+
+def test_a_dry_run_whose_plan_is_taken_away_trains_nothing(tmp_path: Path) -> None:
+    status, output = sweep(
+        tmp_path, "seed=0", "~hydra.callbacks.sweep", options=("-m", "--dry-run")
+    )
+    assert status == 1, output
+    assert "nothing is trained" in output
+    assert not [*tmp_path.rglob("steps.csv")]
+
+
+def test_a_folder_with_other_settings_is_named(tmp_path: Path) -> None:
+    folder = tmp_path / "outputs" / "steps" / "0.001-0"
+    folder.mkdir(parents=True)
+    (folder / "last.ckpt").touch()
+    (folder / "settings.json").write_text("{}")
+    status, output = sweep(tmp_path, "seed=0", options=("-m", "--dry-run"))
+    assert status == 1, output
+    assert "settings.json is no run's" in output
 
 
 def planned(state: str, left: float | None) -> Planned:

@@ -3,12 +3,7 @@
 import pytest
 
 IGNORED = [
-    pytest.mark.filterwarnings(f"ignore:{message}")
-    for message in (
-        "Your `IterableDataset` has `__len__` defined",
-        ".*does not have many workers",
-        r"`isinstance\(treespec, LeafSpec\)` is deprecated",
-    )
+    pytest.mark.filterwarnings(r"ignore:`isinstance\(treespec, LeafSpec\)` is deprecated"),
 ]
 """The reasons stand there."""
 

@@ -21,7 +21,7 @@ from ngi.learn.batch import Batch, Feedback
 from ngi.learn.samples import PatchSamples
 from ngi.learn.stream import TrainingStream
 from ngi.render import AnalyticRenderer, PocketRenderer
-from ngi.reuse import DrawingRule, FixedProbability, PatchArchive, PatchStore, ReusePolicy
+from ngi.reuse import DrawingRule, FixedProbability, PatchArchive, PatchStore, Reuse, ReusePolicy
 
 CHAINS = 4
 
@@ -57,13 +57,15 @@ def make(
             target=target or (Loss() if greedy else ConstantTarget()),
             acceptance=Greedy(accept_equal=False) if greedy else Always(),
         ),
-        store=PatchStore(capacity=capacity, layout=renderer.layout, rule=rule),
-        archive=PatchArchive(folder),
-        policy=policy or FixedProbability(bootstrap_batches=3, probability=0.5),
+        reuse=Reuse(
+            store=PatchStore(capacity=capacity, layout=renderer.layout, rule=rule),
+            archive=PatchArchive(folder),
+            policy=policy or FixedProbability(bootstrap_batches=3, probability=0.5),
+            when_late=when_late,
+        ),
         schedule=schedule or constant_resolution(24),
         clock=clock or PhaseClock(),
         seed=seed,
-        when_late=when_late,
     )
 
 

@@ -22,7 +22,7 @@ from tests.learn.composition import run_config
 
 pytestmark = [  # as ngi.learn.lightning_api has them, which pytest resets
     pytest.mark.filterwarnings(f"ignore:.*{words}")
-    for words in ("IterableDataset", "LeafSpec", "dataloader is not resumable")
+    for words in ("LeafSpec", "dataloader is not resumable")
 ]
 
 SECONDS = {

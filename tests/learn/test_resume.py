@@ -7,7 +7,6 @@ import pytest
 import torch
 
 from ngi.clock.phase_clock import PHASES
-from ngi.learn import checkpoint_bytes, read_checkpoint
 from tests.learn.command_line import BRIEF, run, start
 from tests.learn.comparison import assert_same, final_state
 
@@ -102,24 +101,3 @@ def test_the_log_has_one_row_per_step(unbroken: Path) -> None:
     generated = steps["generated_batches"].diff() > 0
     assert steps.loc[generated, "acceptance_rate"].notna().all()
     assert steps.loc[steps["step"] > 5, ["loss_new", "loss_existing"]].notna().all().all()
-
-
-def test_a_run_whose_steps_lightning_took_goes_on_bit_for_bit(
-    tmp_path: Path, unbroken: Path
-) -> None:
-    assert run(tmp_path, *COMMAND, "budget.steps=40", "run.folder=run")[0] == 0
-    file = tmp_path / "run" / "last.ckpt"
-    checkpoint = read_checkpoint(file)
-    callbacks, loop = checkpoint["callbacks"], checkpoint["loops"]["fit_loop"]
-    callbacks["StepGuard"] = checkpoint.pop("step_guard")
-    callbacks["SamplerFeedback"] = callbacks.pop("StepLog")
-    counted = loop["epoch_loop.manual_optimization.optim_step_progress"]
-    count = {"ready": 0, "completed": 0}
-    loop["epoch_loop.manual_optimization.optim_step_progress"] = {"total": count, "current": count}
-    progress = loop["epoch_loop.automatic_optimization.optim_progress"]
-    progress["optimizer"]["step"] = counted
-    file.write_bytes(checkpoint_bytes(checkpoint))
-    status, output = run(tmp_path, *COMMAND, "run.folder=run")
-    assert status == 0, output
-    assert "going on from step 40" in output
-    assert_same(final_state(tmp_path / "run"), final_state(unbroken))

@@ -9,7 +9,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from ngi.scene import transforms
-from ngi.scene.release.meshes import obj_vertices, ply_vertices
+from ngi.scene.release.meshes import vertices
 from ngi.scene.release.motion import Motion
 from ngi.scene.release.source import Source
 from ngi.scene.variable import Values
@@ -74,10 +74,8 @@ def _points(source: Source, shape: Element) -> Values:
 def _own_points(source: Source, shape: Element) -> Values:
     kind = shape.get("type")
     match kind:
-        case "ply":
-            return ply_vertices(_file(source, shape))
-        case "obj":
-            return obj_vertices(_file(source, shape))
+        case "ply" | "obj":
+            return vertices(_file(source, shape), kind)
         case "rectangle":
             return _SQUARE
         case "cube":

@@ -1,0 +1,108 @@
+"""README, start page and page of results say no more than their tables do."""
+
+import re
+from itertools import pairwise
+
+import pandas as pd
+import pytest
+
+from analysis.readme_table import claim_lines
+from tests.docs.pages import ROOT
+
+PHRASES = {
+    "position preconditioning helps": "preconditioning",
+    "less error than CNSR": "cnsr",
+    "target function": "target_function",
+    "greedy acceptance": "acceptance",
+    "more benefit with more variables": "dimensions",
+    "traced specular bounces": "specular",
+    "less error than ANF": "anf",
+    "128 variables": "chess",
+    "less error than uniform sampling": "same_time",
+    "growing resolution": "resolution",
+    "chains that follow the target density": "histogram",
+}
+"""How the README names the claims."""
+
+FRACTIONS = {"a fifteenth": 1 / 15, "a ninth": 1 / 9, "a third": 1 / 3}
+
+
+def said(page: str, pattern: str) -> tuple[str, ...]:
+    found = re.search(pattern, (ROOT / page).read_text())
+    assert found, f"{page} has no '{pattern}' any more: change this test with it"
+    return found.groups()
+
+
+def test_the_readme_gives_every_claim_the_verdict_of_the_report() -> None:
+    lines = claim_lines((ROOT / "docs/small/results.md").read_text())
+    verdicts = {line["claim"]: line["of the claim"] for line in lines if line["of the claim"]}
+    status = said("README.md", r"(?s)## Status\n(.+?)\n## ")[0]
+    marks = [*re.finditer(r"Reproduced\*\*|Inconclusive:|Not reproduced\*\*|Never run", status)]
+    shown = [
+        (claim, mark[0].rstrip("*:").lower())
+        for mark, after in pairwise(marks)
+        for phrase, claim in PHRASES.items()
+        if phrase in status[mark.end() : after.start()]
+    ]
+    assert sorted(shown) == sorted(verdicts.items())
+
+
+def time_to_the_papers_error() -> float:
+    return float(said("docs/learner/README.md", r"at most 0\.\d+ to (0\.\d+) of its run time")[0])
+
+
+@pytest.mark.parametrize(
+    ("page", "pattern"),
+    [
+        ("README.md", r"with within (a fifteenth) of its time on all seven"),
+        ("docs/index.md", r"ends with in (a fifteenth) of its time"),
+    ],
+)
+def test_ours_is_not_said_to_be_faster_than_it_is(page: str, pattern: str) -> None:
+    assert time_to_the_papers_error() <= FRACTIONS[said(page, pattern)[0]]
+
+
+def test_a_frame_of_ours_takes_the_share_of_the_denoisers_time_that_is_said() -> None:
+    rows = re.findall(
+        r"^\| [\w-]+ \| \d+ \| \d+ \| (\d+) \| \d+ \| \d+ \| (\d+) \|$",
+        (ROOT / "docs/learner/README.md").read_text(),
+        flags=re.MULTILINE,
+    )
+    shares = [int(ours) / int(denoised) for ours, denoised in rows]
+    said("README.md", "half to two thirds of the denoiser's time on the four scenes")
+    assert len(shares) == 4
+    assert round(min(shares), 1) == 0.5
+    assert round(max(shares), 1) <= 0.7
+
+
+def test_the_page_of_results_counts_the_runs_that_there_are() -> None:
+    (total,) = said("docs/results.md", r"`make report`: (\d+) runs")
+    counts = said("docs/small/README.md", r"three seeds, (\d+) runs, (\d+) of .+? and (\d+) of")
+    assert int(total) == sum(map(int, counts))
+    effect = said("docs/results.md", r"the difference is (\+0\.\d %) \((−\d\.\d) to (\+\d\.\d)\)")
+    assert effect == said(
+        "docs/small/README.md", r"\*\*(\+0\.\d %) \((−\d\.\d) to (\+\d\.\d)\)\*\*"
+    )
+    (steps,) = said("docs/results.md", r"Scoring them costs (\d) % of the steps")
+    assert (steps,) == said("docs/small/README.md", r"\*Scoring\* takes (\d) % of the steps")
+
+
+def test_the_page_of_results_says_of_the_map_what_the_map_says() -> None:
+    folder = ROOT / "docs" / "exploration-map"
+    evaluations = pd.read_csv(folder / "exploration_map.csv.gz")
+    setting = list(evaluations.loc[:, "volume":"seed"])
+    (runs,) = said("docs/results.md", r"The map, ([\d,]+) runs")
+    assert int(runs.replace(",", "")) == len(evaluations[setting].drop_duplicates())
+    speedups = pd.read_csv(folder / "speedups.csv")
+    base = speedups.query(
+        "volume == 0.01 and dimensions == 8 and active == 4 and pockets == 1 and sharpness == 0 "
+        "and noise == 0 and hidden_features == 64 and cost_ratio == 10 and sampler == 'loss_greedy'"
+    ).set_index(["error", "reuse"])["speedup"]
+    new, reused = said(
+        "docs/results.md", r"in (a \w+) of the time with every batch new, in (a \w+) with self-"
+    )
+    assert 1 / base["error_tail", False] <= FRACTIONS[new]
+    assert 1 / base["error_tail", True] <= FRACTIONS[reused]
+    low, high = said("docs/results.md", r"For the \*mean\* error it takes (\d) to (\d) times")
+    slower = sorted(round(1 / base["error_uniform", reuse]) for reuse in (True, False))
+    assert slower == [int(low), int(high)]
