@@ -9,7 +9,8 @@ machines without OptiX; and says how much all of it is. There, in a checkout of 
     python -m pip install --no-index --no-deps FOLDER/*.whl && python -m pip install --no-deps -e .
     xz -dk FOLDER/libLLVM.so.xz && export DRJIT_LIBLLVM_PATH=FOLDER/libLLVM.so
 
---no-deps, since pyproject.toml pins another PyTorch than that machine's.
+What libLLVM itself is linked with (`ldd` says it) has to be there. `ngi doctor` says which of the
+driver's libraries Mitsuba lacks there. --no-deps, since pyproject.toml pins another PyTorch than that machine's.
 """
 
 from __future__ import annotations
