@@ -10,7 +10,7 @@ machines without OptiX; and says how much all of it is. There, in a checkout of 
     xz -dk FOLDER/libLLVM.so.xz && export DRJIT_LIBLLVM_PATH=FOLDER/libLLVM.so
 
 What libLLVM itself is linked with (`ldd` says it) has to be there. `ngi doctor` says which of the
-driver's libraries Mitsuba lacks there. --no-deps, since pyproject.toml pins another PyTorch than that machine's.
+driver's libraries Mitsuba lacks there. --no-deps, since pyproject.toml pins another PyTorch.
 """
 
 from __future__ import annotations
