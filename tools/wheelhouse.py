@@ -101,7 +101,7 @@ def trim(wheel: Path) -> None:
 def listed(wheel: Path) -> bool:
     """Whether every file of a wheel is what its list says."""
     with zipfile.ZipFile(wheel) as archive:
-        names = set(archive.namelist())
+        names = {entry.filename for entry in archive.infolist() if not entry.is_dir()}
         (record,) = (name for name in names if name.endswith(".dist-info/RECORD"))
         for line in archive.read(record).decode().splitlines():
             name, checksum, _ = line.rsplit(",", 2)

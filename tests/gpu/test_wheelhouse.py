@@ -21,6 +21,7 @@ RECORD = "mitsuba-3.dist-info/RECORD"
 
 def wheel(path: Path) -> Path:
     with zipfile.ZipFile(path, "w") as archive:
+        archive.mkdir("mitsuba")
         lines = []
         for name in (*FILES, *LEFT_OUT):
             content = name.encode() * 3
@@ -36,7 +37,7 @@ def test_the_variants_that_this_program_chooses_are_kept_and_no_others(tmp_path:
     assert listed(made)
     trim(made)
     with zipfile.ZipFile(made) as archive:
-        assert set(archive.namelist()) == {*FILES, RECORD}
+        assert set(archive.namelist()) == {"mitsuba/", *FILES, RECORD}
         assert archive.read(FILES[0]) == FILES[0].encode() * 3
     assert listed(made)
 
