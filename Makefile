@@ -23,7 +23,7 @@ demo: setup ## train ours, the paper's method and uniform sampling, compare them
 	$(BIN)/python -m analysis.report outputs/demo && exit $$status
 
 view: setup ## trained networks in the browser: SCENE=living-room|sphere-caustic|veach-egg
-	@$(BIN)/python -m ngi.view run=scenes/$(SCENE)/network
+	@$(BIN)/ngi view run=scenes/$(SCENE)/network
 
 test: setup lint smoke ## linter, type checker, all tests, smoke run on real renders
 	@sh tools/browser.sh
@@ -42,7 +42,7 @@ smoke: setup
 
 report: setup ## all sweeps at BUDGET=smoke|small|paper: runs what is missing, builds the report
 	@failed=0; for sweep in $(SWEEPS); do \
-	$(BIN)/python -m ngi.costs -m +sweeps=$$sweep budget=$(BUDGET) $(OPTIONS) && \
+	$(BIN)/ngi costs -m +sweeps=$$sweep budget=$(BUDGET) $(OPTIONS) && \
 	$(BIN)/python -m ngi.train -m +sweeps=$$sweep budget=$(BUDGET) budget.clock=model $(OPTIONS) \
 	|| failed=1; done; \
 	$(BIN)/python -m analysis.report outputs/$(BUDGET)-model-clock && exit $$failed
@@ -57,13 +57,13 @@ $(VENV)/.docs: $(VENV)/.complete
 	@touch $@
 
 benchmark: setup ## speed as ratios, with the machine's own limits measured beside: 15 minutes
-	@$(BIN)/python -m ngi.benchmark
+	@$(BIN)/ngi benchmark
 
 gpu: setup ## everything there is to find out on a GPU; goes on where it stopped: OPTIONS='--minutes 10'
-	@$(BIN)/python -m ngi.gpu_check $(OPTIONS)
+	@$(BIN)/ngi gpu-check $(OPTIONS)
 
 doctor: setup ## what this machine has, and how to get what is missing
-	@$(BIN)/python -m ngi.doctor
+	@$(BIN)/ngi doctor
 
 clean: ## delete the virtual environment; results stay
 	rm -rf $(VENV)

@@ -1,4 +1,4 @@
-"""How steady networks are in motion: what `python -m ngi.video` measured, as tables."""
+"""How steady networks are in motion: what `ngi video` measured, as tables."""
 
 from __future__ import annotations
 

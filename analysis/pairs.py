@@ -106,7 +106,7 @@ def log_errors(run: Run, set_name: str, metrics: Sequence[str]) -> dict[int, flo
 
 
 def log_error(error: float) -> float:
-    """Its logarithm, of `SMALLEST_ERROR` where it is smaller, and NaN where it is not finite."""
+    """The logarithm of an error, at least that of `SMALLEST_ERROR`. NaN for NaN or Inf."""
     return math.log(max(error, SMALLEST_ERROR)) if math.isfinite(error) else math.nan
 
 

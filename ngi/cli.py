@@ -26,26 +26,38 @@ class Verb:
 
 WAY = {
     "First": (
-        Verb("doctor", "ngi.doctor", "what this machine has for rendering and training"),
+        Verb("doctor", "ngi.commands.doctor", "what this machine has for rendering and training"),
         Verb("train", "ngi.train", "train a network, or a sweep of runs; go on where it stopped"),
         Verb("report", "analysis.report", "compare runs: tables, plots, verdicts on the claims"),
     ),
     "Look at a run": (
         Verb("view", "ngi.view.__main__", "in the browser, with a slider for every variable"),
-        Verb("render", "ngi.render.__main__", "one picture of any configuration, as PNG or EXR"),
-        Verb("video", "ngi.video", "a path through the scene, and how steady the network is"),
-        Verb("export", "ngi.export", "the network as one ONNX file, for other programs"),
+        Verb("render", "ngi.view.picture", "one picture of any configuration, as PNG or EXR"),
+        Verb("video", "ngi.view.video", "a path through the scene, and how steady the network is"),
+        Verb("export", "ngi.view.export", "the network as one ONNX file, for other programs"),
     ),
     "Scenes": (
         Verb("describe", "ngi.view.describe", "what varies in a scene, or could; what is wrong"),
         Verb("gallery", "ngi.view.gallery", "a contact sheet of every scene"),
     ),
     "Measure": (
-        Verb("costs", "ngi.costs", "what steps cost here, to count run time fairly when training"),
-        Verb("metrics", "ngi.metrics", "metrics again, from a run's linear pictures"),
-        Verb("benchmark", "ngi.benchmark", "how fast every part of the program is"),
-        Verb("gpu-check", "ngi.gpu_check", "everything there is to find out on a GPU, in parts"),
-        Verb("stability", "ngi.stability", "what becomes of extreme and stiff cases"),
+        Verb(
+            "costs",
+            "ngi.commands.costs",
+            "what steps cost here, to count run time fairly when training",
+        ),
+        Verb("metrics", "ngi.commands.metrics", "metrics again, from a run's linear pictures"),
+        Verb(
+            "benchmark", "ngi.studies.benchmark.__main__", "how fast every part of the program is"
+        ),
+        Verb(
+            "gpu-check",
+            "ngi.studies.gpu_check.__main__",
+            "everything there is to find out on a GPU, in parts",
+        ),
+        Verb(
+            "stability", "ngi.studies.stability.__main__", "what becomes of extreme and stiff cases"
+        ),
     ),
 }
 """The verbs, in the order in which one meets them."""

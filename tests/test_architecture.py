@@ -17,14 +17,14 @@ ROOMS = (
 )
 """From the ground up: each may import those before it, and itself."""
 
-COMMANDS = ("train", "costs", "metrics", "video", "export", "doctor")
+COMMANDS = ("train", "commands")
 """Entry points, which stand on all the rooms."""
 
 STUDIES = ("studies",)
 """What measures the program: it may import everything above."""
 
-DOORS = ("benchmark", "exploration_map", "gpu_check", "stability", "cli", "__main__")
-"""What opens the studies to the command line, and the command line itself."""
+DOORS = ("cli", "__main__")
+"""The command line, which imports the module of a verb when it is asked for."""
 
 STOREYS = {
     **{name: number for number, name in enumerate(ROOMS)},
@@ -34,8 +34,6 @@ STOREYS = {
         for name in names
     },
 }
-ON_THE_COMMAND_LINE = ("ngi.render.__main__", "ngi.view.__main__")
-"""`python -m ngi.ROOM`: entry points, though they lie in a room."""
 
 WITH_MITSUBA = ("machine", "scene", "render", "denoise", "studies")
 """Who may use mitsuba and drjit, by way of `ngi.machine.backend`."""
@@ -91,8 +89,6 @@ def storey(module: str) -> int:
     """-1 for `ngi` itself, which holds the version and imports nothing."""
     if module == "ngi":
         return -1
-    if module in ON_THE_COMMAND_LINE:
-        return STOREYS[COMMANDS[0]]
     return STOREYS[module.split(".")[1]]
 
 
@@ -126,6 +122,11 @@ def test_an_arrow_upward_is_noticed() -> None:
     ]
 
 
+def test_everything_is_in_a_room() -> None:
+    loose = {file.stem for file in (ROOT / "ngi").glob("*.py")}
+    assert loose == {"__init__", "__main__", "cli", "patches", "train"}
+
+
 def test_imports_make_no_circle() -> None:
     assert circle(import_graph(modules("ngi"))) == []
     assert circle(import_graph(modules("analysis"))) == []
@@ -150,8 +151,7 @@ def test_the_program_knows_neither_studies_nor_tests() -> None:
         for name, file in files.items()
         if starts_with(set(imports(file)), "ngi.studies") and not name.startswith("ngi.studies")
     }
-    doors = ("benchmark", "exploration_map", "gpu_check", "stability")
-    assert measuring == {f"ngi.{door}" for door in doors}
+    assert measuring == set()
     assert not {n for n, file in files.items() if starts_with(set(imports(file)), "tests")}
 
 
@@ -196,7 +196,7 @@ def test_no_constructor_takes_a_configuration() -> None:
         if starts_with(set(imports(file)), "hydra", "omegaconf")
     }
     assert {name for name in users if not name.startswith("ngi.config.")} == {
-        "ngi.costs",
+        "ngi.commands.costs",
         "ngi.methods.path_tracing.run",
         "ngi.studies.ceiling.__main__",
         "ngi.studies.ceiling.campaign",

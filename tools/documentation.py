@@ -56,24 +56,19 @@ def pages() -> dict[str, str]:
 
 def commands() -> str:
     """What `ngi --help` prints, and where each verb is explained."""
-    rows = [
-        f"| `ngi {verb.name}` | {verb.help} | `python -m {verb.module.removesuffix('.__main__')}` |"
-        for verbs in WAY.values()
-        for verb in verbs
-    ]
-    table = "\n".join(["| command | what for | module |", "| --- | --- | --- |", *rows])
+    rows = [f"| `ngi {verb.name}` | {verb.help} |" for verbs in WAY.values() for verb in verbs]
+    table = "\n".join(["| command | what for |", "| --- | --- |", *rows])
     return (
         f'# Commands\n\n```text title="ngi --help"\n{overview()}\n```\n\n'
-        "`ngi VERB --help` says what a verb takes. There are three ways of speaking: `train` and "
-        "`costs` take Hydra's `group=option` and `key=value` ([Groups and options](options.md)), "
-        "`view`, `render`, `video` and `export` take `key=value`, the others take names and "
-        "`--flags`.\n\n"
+        "`ngi VERB --help` says what a verb takes. All take `key=value`; `train` and `costs` also "
+        "Hydra's `group=option` ([Groups and options](options.md)). The first key can be left out: "
+        "`ngi describe mirror` is `ngi describe scene=mirror`. Only `report` takes `--flags`.\n\n"
         f"{table}\n\n"
         "Further programs, for studies of the method itself, are started as modules: "
-        "`python -m ngi.studies.noise`, `python -m ngi.exploration_map`, "
+        "`python -m ngi.studies.noise`, `python -m ngi.studies.exploration_map`, "
         "`python -m analysis.exploration_map`, `python -m analysis.endurance`.\n\n"
-        "The exit status is 0 where all went well, 1 where the work failed, 2 for a wrong command, "
-        "130 after Ctrl-C, 143 after SIGTERM.\n"
+        "The exit status is 0 where all went well, 1 where the work failed, 2 for a wrong command "
+        "or value, 130 after Ctrl-C, 143 after SIGTERM.\n"
     )
 
 

@@ -74,8 +74,8 @@ def read_table(folder: Path) -> pd.DataFrame:
     file = folder / TABLE
     if not file.exists():
         raise ValueError(
-            f"{file}: there is no such file; python -m ngi.exploration_map writes it once all its "
-            "runs are finished"
+            f"{file}: there is no such file; python -m ngi.studies.exploration_map writes it once "
+            "all its runs are finished"
         )
     table = pd.read_csv(file)
     missing = {*SETTING, *CURVE, "generated_batches", "scored_batches", *ERRORS} - {*table}

@@ -74,10 +74,10 @@ class Comparison:
     def speedup(self) -> Speedup:
         """How much sooner the sampler gets to the same error.
 
-        The error is that with which the worse of the two ends, where both have had the same run
-        time; its time is all of it, and the better one's the time from which its error stays at or
-        below. Curves are means over the seeds, smoothed; the interval resamples seeds, the same
-        for both.
+        Both have the same run time. The error is the one that the worse of the two ends with, so
+        the worse one takes all of the time. The better one takes the time from which on its error
+        stays at or below that. Curves are means over the seeds, smoothed. The interval resamples
+        seeds, the same for both.
         """
         uniform = self.curves(UNIFORM, scoring=0.0)
         explored = self.curves(self.sampler, scoring=scoring_cost(self.sampler))

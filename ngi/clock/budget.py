@@ -13,7 +13,7 @@ class Budget:
     steps, seconds: at least one of them; None for no such limit. Run time stands still during
         evaluations and checkpoints. A resumed run with a budget in steps ends as an unbroken one.
     clock: what seconds mean: 'wall', those of `PhaseClock`; 'model', those of `ModelClock`, counted
-        with the costs that `python -m ngi.costs` has measured, whatever else the machine does
+        with the costs that `ngi costs` has measured, whatever else the machine does
     costs: path of the file that holds these costs, for clock 'model'
     Raises ValueError where neither limit is given, for limits that are not positive and for an
     unknown clock.
@@ -40,7 +40,7 @@ class Budget:
         if clock == "model" and costs is None:
             raise ValueError(
                 "budget.costs: null; the model clock needs the path of the file that "
-                "`python -m ngi.costs` writes"
+                "`ngi costs` writes"
             )
         self.steps = steps
         self.seconds = seconds

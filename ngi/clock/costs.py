@@ -39,7 +39,7 @@ Costs = dict[str, dict[str, float]]
 NOT_AVERAGED = "ngi.models.no_average"
 """What conf/averaging/none.yaml names."""
 
-REMEDY = "measure it by the same command line with `python -m ngi.costs` for `python -m ngi.train`"
+REMEDY = "measure it by the same command line with `ngi costs` for `ngi train`"
 
 
 @dataclass(frozen=True)
@@ -197,6 +197,6 @@ class CostFile:
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise ValueError(
                 f"budget.costs: {self.path} is damaged ({type(error).__name__}: {error}); correct "
-                "it, or delete it and measure again with `python -m ngi.costs`"
+                "it, or delete it and measure again with `ngi costs`"
             ) from error
         return entries

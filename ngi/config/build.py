@@ -62,10 +62,15 @@ def build_network(config: DictConfig, *, samples: Samples) -> nn.Module:
     """The network for these samples, its weights as they are before the first step."""
     from ngi import learn
 
-    network: nn.Module = learn.seeded(instantiate(config.model), seed=config.seed)(
-        layout=samples.layout, scene_dimensions=samples.network_dimensions
-    )
-    return network
+    make = learn.seeded(instantiate(config.model), seed=config.seed)
+    try:
+        return learn.network_of(samples, make)
+    except TypeError as error:
+        raise ValueError(
+            f"model: {error}; a network takes the keys of model, among them hidden_features and "
+            "hidden_layers, which budgets set, and of layout, scene_dimensions and moving what it "
+            "asks for"
+        ) from error
 
 
 def build_module(

@@ -1,27 +1,16 @@
-"""`key=value` on the command lines of small programs, as `ngi.train` takes it, checked by type."""
+"""`key=value` on the command lines of small programs, as `ngi train` takes it, checked by type."""
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import MISSING, Field, field, fields
 from typing import Any, NoReturn, TypeVar, cast
 
-from omegaconf import OmegaConf
-from omegaconf.errors import OmegaConfBaseException
-from yaml import YAMLError
+from pydantic import TypeAdapter, ValidationError
 
 Options = TypeVar("Options")
-
-_WORDS = {
-    "int": "an integer",
-    "float": "a number",
-    "bool": "true or false",
-    "str": "a text",
-    "str | None": "a text",
-    "list[float] | None": "a list of numbers, such as [0.5,0.2]",
-}
-"""For the annotations of options."""
 
 
 def option(text: str, default: Any = MISSING) -> Any:
@@ -30,29 +19,44 @@ def option(text: str, default: Any = MISSING) -> Any:
 
 
 def read_options(kind: type[Options], program: str, arguments: Sequence[str]) -> Options:
-    """A `kind`, whose fields are made by `option`, from `key=value` arguments in YAML's notation.
+    """A `kind`, whose fields are made by `option`, from `key=value` arguments; lists are `[a,b]`.
 
+    Words without a key are the value of the first field, which takes several if it is a list.
     Ends the program with status 0 where help is asked for, its text being `kind`'s docstring and
     its fields', and with status 2 and a message for an unknown or missing key or a wrong value.
     """
     if {"-h", "--help"} & set(arguments):
         print(_help(kind, program))
         sys.exit(0)
-    given = [argument.partition("=") for argument in arguments]
-    known = {entry.name: entry.type for entry in fields(cast("Any", kind))}
-    for key, equals, _ in given:
-        if key not in known or not equals:
-            _refuse(program, f"'{key}' is no option; there are {', '.join(sorted(known))}")
-    required = {e.name for e in fields(cast("Any", kind)) if e.default is MISSING}
-    if missing := sorted(required - {key for key, _, _ in given}):
-        _refuse(program, f"give {missing[0]}=…")
-    values = OmegaConf.structured(kind)
-    for argument, (key, _, _) in zip(arguments, given, strict=True):
-        try:
-            values = OmegaConf.merge(values, OmegaConf.from_dotlist([argument]))
-        except (OmegaConfBaseException, YAMLError):
-            _refuse(program, f"'{argument}' is wrong: {key} is {_WORDS[str(known[key])]}")
-    return cast("Options", OmegaConf.to_object(values))
+    entries = {entry.name: str(entry.type) for entry in fields(cast("Any", kind))}
+    given: dict[str, str] = {}
+    for word in _with_key(arguments, *next(iter(entries.items()), ("", ""))):
+        key, equals, text = word.partition("=")
+        if key not in entries or not equals:
+            _refuse(program, f"'{key}' is no option; there are {', '.join(sorted(entries))}")
+        given[key] = text
+    values = {k: _list(v) if entries[k].startswith("list") else v for k, v in given.items()}
+    try:
+        return TypeAdapter(kind).validate_python(values)
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = str(first["loc"][0])
+        if key not in given:
+            _refuse(program, f"give {key}=…")
+        _refuse(program, f"'{key}={given[key]}' is wrong: {first['msg'].lower()}")
+
+
+def _list(text: str) -> list[str]:
+    return [item.strip() for item in text.strip("[]").split(",")]
+
+
+def _with_key(words: Sequence[str], key: str, kind: str) -> list[str]:
+    """Words of a command line, those that have no key gathered as the value of this one."""
+    bare = [word for word in words if not re.match(r"-|\w+=", word)]
+    rest = [word for word in words if word not in bare]
+    if bare and kind.startswith("list"):
+        return [f"{key}={','.join(bare)}", *rest]
+    return [*(f"{key}={word}" for word in bare[:1]), *bare[1:], *rest]
 
 
 def run_tool(
@@ -86,9 +90,10 @@ def _refuse(program: str, problem: str) -> NoReturn:
 
 def _help(kind: type, program: str) -> str:
     rows = [(_shown(entry), entry.metadata["help"]) for entry in fields(kind)]
-    width = 2 + max(len(name) for name, _ in rows)
+    width = 2 + max((len(name) for name, _ in rows), default=0)
     lines = [f"  {name:{width}}{text}" for name, text in rows]
-    return "\n".join([f"{program} key=value …\n", (kind.__doc__ or "").strip(), "", *lines])
+    usage = f"{program} key=value …" if rows else program
+    return "\n".join([f"{usage}\n", (kind.__doc__ or "").strip(), "", *lines])
 
 
 def _shown(entry: Field[Any]) -> str:

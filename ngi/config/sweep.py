@@ -1,7 +1,7 @@
 """A sweep from its start to its end: a table of its runs, a line after each, and what failed.
 
-Hydra calls this (`hydra.callbacks`), in the process that starts the sweep and, a copy of it, in
-those that its launcher starts.
+Hydra calls this (`hydra.callbacks`) in the process that starts the sweep. Processes that its
+launcher starts have a copy.
 """
 
 from __future__ import annotations

@@ -31,10 +31,10 @@ class RunFolder:
         as plain JSON data.
     linear_megabytes: see `Evaluation.write`
     lengthened: whether the folder holds the same run with a smaller budget
-    restarted: set where what the folder holds of this run is to be deleted by `begin`
+    restarted: whether `begin` will delete what the folder holds of this run
     Raises ValueError where the folder holds another run, RuntimeError where another process is
-    training in it, OSError where it can not be written to. Nothing in the folder is touched before
-    that is known.
+    training in it, OSError where it can not be written to. In all these cases nothing in the folder
+    has been touched.
     """
 
     def __init__(

@@ -11,8 +11,8 @@ from ngi.learn.run import Run
 class LearningRate(Callback):
     """Sets the optimiser's learning rates for the next step, once the sampler has its feedback.
 
-    They depend on the steps and the clock that a checkpoint holds, and on nothing before, so that a
-    run that goes on goes on as one that was not broken off.
+    The rates depend only on steps and clock, which a checkpoint holds. A resumed run therefore has
+    the same rates as one that was never interrupted.
     """
 
     def __init__(self, run: Run) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from functools import wraps
 from inspect import signature
 from typing import Any, TypeVar
 
@@ -125,6 +126,11 @@ class IlluminationModule(LightningModule):
             return self._scorer_of(target).signals(patches.to(self.device), self._optimizer())
 
     def _check_inputs(self, patches: Patches) -> None:
+        if not hasattr(self.network, "render"):
+            raise ValueError(
+                f"model: {type(self.network).__name__} has no method render(buffers, scene_vector)"
+                ", which makes the whole images that are evaluated and shown"
+            )
         inputs, _ = self._example(patches)
         takes = signature(self.network.forward)
         try:
@@ -157,6 +163,7 @@ def seeded(make: Callable[..., T], *, seed: int) -> Callable[..., T]:
     PyTorch's initialisers know no other generator.
     """
 
+    @wraps(make)
     def seeded_make(**arguments: Any) -> T:
         with torch.random.fork_rng(devices=[]):  # weights are made on the CPU
             torch.default_generator.manual_seed(seed)

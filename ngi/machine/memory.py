@@ -61,7 +61,7 @@ def allocated_bytes() -> int | None:
 
 
 def _of_c_library(name: str) -> Any:
-    """One of its functions; None where it has none of that name, or the system is not Linux."""
+    """A function of the C library. None if there is no such function, or outside Linux."""
     if not sys.platform.startswith("linux"):
         return None
     return getattr(ctypes.CDLL(None), name, None)

@@ -66,8 +66,9 @@ def code_commit() -> tuple[str | None, bool]:
 def code_hash() -> str:
     """16 hexadecimal digits over every module of this package, with its name.
 
-    It tells two states of the code apart that have one commit, and none where only files beside
-    the package have changed; what a configuration takes from other packages is not in it.
+    It differs between two states of the code with the same commit, if a module of the package has
+    changed. Files beside the package, and classes that a configuration takes from other packages,
+    do not count.
     """
     folder = Path(ngi.__file__).resolve().parent
     digest = hashlib.sha256()

@@ -45,7 +45,7 @@ class PatchLinear(nn.Linear):
         """
         if self.watcher is None:
             return _patch_linear(self.weight, self.bias, scene_vector, pixels)
-        output = _Watched.apply(self.watcher, self.weight, self.bias, *pixels, scene_vector)
+        output = _Watched.apply(self.watcher, self.weight, self.bias, *pixels, scene_vector)  # type: ignore[no-untyped-call]
         assert isinstance(output, Tensor)
         return output
 

@@ -75,7 +75,7 @@ class PixelMLP(nn.Module):
         if torch.is_grad_enabled():
             if self.watcher is not None:
                 patch_bias.register_hook(partial(self._show_of_patches, self.watcher, patch))
-            output = _Layers.apply(self.watcher, *arguments)
+            output = _Layers.apply(self.watcher, *arguments)  # type: ignore[no-untyped-call]
         else:
             output, _, _ = _forward(*arguments)
         assert isinstance(output, Tensor)

@@ -15,9 +15,9 @@ from ngi.render.tracing import Pending, Window, subpixel_points
 class ScalarTracer:
     """The `ngi.render.tracing.Tracer` of scalar_rgb.
 
-    Radiance is Mitsuba's own compiled rendering loop over the crop window of a box-filtered copy
-    of the scene's camera, which follows where that one stands and how wide it looks; the buffers
-    are a Python loop over pixels, so that few samples pay.
+    Radiance comes from Mitsuba's own compiled rendering loop, over the crop window of a copy of the
+    scene's camera with a box filter. The copy follows the camera's place and field of view. The
+    buffers come from a Python loop over pixels, so that only few samples are affordable.
     """
 
     def __init__(self, *, scene: mi.Scene, first_hit: FirstHit, buffer_samples: int) -> None:

@@ -5,9 +5,10 @@ again, on one thread, with the structure above them. That takes 30 to 250 ms for
 longer than tracing a patch. Embree itself needs to be told only what moved: a group's structure is
 left alone, and the one above it, over a few instances and lamps, takes less than a millisecond.
 
-Mitsuba has no function for that, but its wheels bring Embree as a library of its own. Its functions
-are called here on Mitsuba's own scene, which is taken for it only where everything looks as it did
-in the version that this was written for; if not, Mitsuba builds, and only time is lost.
+Mitsuba has no function for that, but its wheels bring Embree as a separate library. Here Embree's
+functions are called on the scene that Mitsuba has made. They are called only if all that can be
+checked looks as in the version this was written for. Otherwise Mitsuba builds, and only time is
+lost.
 """
 
 from __future__ import annotations
@@ -116,8 +117,8 @@ class EmbreeScene:
 def _handle(scene: mi.Scene, library: ctypes.CDLL) -> int | None:
     """The address of Embree's scene.
 
-    The variables that Dr.Jit finds in a scene begin with two that stand for addresses: that of
-    Embree's scene, and that of the function that intersects it, by which they are recognised.
+    The variables that Dr.Jit finds in a scene begin with two addresses: that of Embree's scene, and
+    that of the function that intersects it. They are recognised by the second.
     """
     variables = variables_of(scene)
     if len(variables) < 2:

@@ -30,8 +30,9 @@ def without_place(message: str) -> str:
 def in_words(message: str, text: str, document: SceneFile) -> str:
     """A message of Mitsuba's about `text`, with line and element of the file that the user wrote.
 
-    text: the document, with a tag per line. An element without an id is named with what it stands
-    in; the line of one that this program has added is that of what the user wrote around it.
+    text: the document, with a tag per line
+    An element without an id is named together with its parent. An element that this program has
+    added has no line of its own; the line of the nearest parent that the user wrote is given.
     """
     match = _HEAD.search(message)
     if match is None:

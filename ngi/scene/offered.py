@@ -1,4 +1,4 @@
-"""What Mitsuba 3.9 lets one change of a loaded scene, and what of it varies here.
+"""The parameters of a loaded scene that Mitsuba 3.9 can change, and which of them vary here.
 
 Every parameter that `mi.traverse` offers of a plugin is named, with the properties of scene.yaml
 that vary it or with the reason why none does. docs/scenes.md shows it as a table.

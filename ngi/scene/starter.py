@@ -32,8 +32,11 @@ def candidates(scene: mi.Scene) -> tuple[list[Candidate], int]:
     found: list[Candidate] = []
     nameless = 0
     for node, (parent, _) in hierarchy.items():
-        if isinstance(parent, mi.Shape | mi.BSDF):
-            continue  # part of a group, of a lamp or of a wrapped BSDF, which stands for it
+        # Part of a group, of a lamp or of a wrapped BSDF, which stands for it; a shape's own BSDF
+        # is an object by itself.
+        whole = mi.BSDF if isinstance(node, mi.BSDF) else mi.Shape | mi.BSDF
+        if isinstance(parent, whole):
+            continue
         entries = _entries(node, scene)
         if not entries:
             continue

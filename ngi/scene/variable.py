@@ -88,7 +88,7 @@ class Variable(ABC):
     @property
     @abstractmethod
     def components(self) -> tuple[str, ...]:
-        """Names of its components of v, one of them empty where there is but one."""
+        """Names of its components of v. A single component has an empty name."""
 
     @abstractmethod
     def value(self, components: Values) -> Values:

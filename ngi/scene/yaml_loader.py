@@ -26,7 +26,7 @@ class _Loader(yaml.SafeLoader):
         self._sizes: dict[int, int] = {}
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
-        event = self.peek_event()
+        event = self.peek_event()  # type: ignore[no-untyped-call]
         self._levels += 1
         if self._levels > MOST_LEVELS:
             self._refuse(f"more than {MOST_LEVELS} levels", event)

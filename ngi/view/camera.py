@@ -35,8 +35,8 @@ class Camera:
     def components(self, origin: ArrayLike, target: ArrayLike) -> Vector:
         """Those components of v that come closest to a view; origin and target in world space.
 
-        The target counts as a direction: it is moved along it into the middle of its box, since a
-        mouse that turns a camera says nothing of how far away it looks.
+        The target counts as a direction only, since a mouse that turns a camera does not say how
+        far away it looks. It is moved in this direction to the middle of its box.
         """
         low, high = np.array(self.variable.minimum), np.array(self.variable.maximum)
         start = np.clip(np.asarray(origin, dtype=np.float64), low[:3], high[:3])

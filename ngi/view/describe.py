@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
+from ngi.config.options import option, run_tool
 from ngi.machine.backend import activate
 from ngi.scene.arrangement import STATIC
 from ngi.scene.clearance import camera_problems
@@ -84,33 +85,27 @@ def _geometry(scene: VariableScene) -> str:
     return f"moves: {', '.join(moving)}{rest}"
 
 
-def main(arguments: list[str] | None = None) -> int:
-    known = scenes()
-    parser = argparse.ArgumentParser(
-        prog="ngi describe",
-        description="Describe a variable scene, check its camera, and say what a run leaves out; "
-        "or list what could vary in a plain Mitsuba file and write a scene.yaml to start from.",
-        epilog=f"Scenes known by name: {', '.join(sorted(known))}.",
+@dataclass
+class DescribeOptions:
+    """Describes a variable scene, checks its camera, and says what a run leaves out; or lists what
+    could vary in a plain Mitsuba file and writes a scene.yaml to start from.
+
+    ngi describe sphere-caustic
+    ngi describe scenes/lamp/scene.xml
+    """
+
+    scene: str = option(
+        "a scene's name or folder, a Mitsuba XML file, or a folder with the authors' tagged one"
     )
-    parser.add_argument(
-        "scene",
-        help="a scene's name or folder, a Mitsuba XML file, or a folder "
-        "with the authors' tagged scene.xml",
-    )
-    parser.add_argument("--backend", default="auto", help="auto, cuda, llvm or scalar")
-    options = parser.parse_args(arguments)
-    try:
-        activate(options.backend)
-        return _describe(options.scene, known)
-    except (ValueError, OSError, RuntimeError) as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
+    backend: str = option("auto, cuda, llvm or scalar", "auto")
 
 
-def _describe(name: str, known: dict[str, dict[str, Any]]) -> int:
-    path = Path(name)
-    if name in known:
-        description = read_scene(**known[name])
+def describe(options: DescribeOptions) -> int:
+    """Prints the description; 1 where something is wrong with the scene."""
+    activate(options.backend)
+    path = Path(options.scene)
+    if (arguments := scenes().get(options.scene)) is not None:
+        description = read_scene(**arguments)
     elif (path / "scene.yaml").is_file():
         description = read_scene(path)
     elif path.is_file() and path.suffix == ".xml" and "var_" not in path.read_text():
@@ -118,8 +113,8 @@ def _describe(name: str, known: dict[str, dict[str, Any]]) -> int:
         return 0
     elif not path.exists():
         raise FileNotFoundError(
-            f"{name}: no such file or folder, and no scene of this name; known are "
-            f"{', '.join(sorted(known))}"
+            f"{path}: no such file or folder, and no scene of this name; known are "
+            f"{', '.join(sorted(scenes()))}"
         )
     else:
         from ngi.scene.release import read_release
@@ -131,6 +126,11 @@ def _describe(name: str, known: dict[str, dict[str, Any]]) -> int:
     for problem in problems:
         print(f"  error: {problem}")
     return 1 if problems else 0
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point of `ngi describe`."""
+    return run_tool(describe, DescribeOptions, "ngi describe", arguments)
 
 
 if __name__ == "__main__":

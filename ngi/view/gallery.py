@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import torch
 from PIL import Image, ImageDraw
 from torch import Tensor
 from tqdm import tqdm
 
+from ngi.config.options import option, run_tool
 from ngi.evaluate.pictures import srgb_picture
 from ngi.scene.folder import read_scene, scenes
 
@@ -22,29 +24,61 @@ COLUMNS = 6
 CAPTION, GAP = 14, 4
 
 
-def sheet(
-    renderer: MitsubaRenderer, *, configurations: int, resolution: int, samples_per_pixel: int
-) -> Image.Image:
+@dataclass
+class GalleryOptions:
+    """Makes a contact sheet of every scene: random configurations, hard frames and buffers.
+
+    ngi gallery mirror salon configurations=4
+    """
+
+    scenes: list[str] | None = option("names; none: all scenes", None)
+    folder: str = option("where to", "outputs/gallery")
+    configurations: int = option("random v per scene", 8)
+    resolution: int = option("pixels a side", 160)
+    samples_per_pixel: int = option("of every picture", 64)
+    backend: str = option("auto, cuda, llvm or scalar", "auto")
+
+
+def write_sheets(options: GalleryOptions) -> None:
+    """A picture per scene; ValueError for an unknown one, before anything is rendered."""
+    from ngi.render.mitsuba_renderer import MitsubaRenderer
+
+    known = scenes()
+    names = options.scenes or sorted(known)
+    if unknown := set(names) - set(known):
+        raise ValueError(f"no scene {sorted(unknown)}; there are {sorted(known)}")
+    folder = Path(options.folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in tqdm(names, desc="scenes"):
+        renderer = MitsubaRenderer(scene=read_scene(**known[name]), backend=options.backend)
+        sheet(renderer, options).save(folder / f"{name}.jpg", quality=85)
+        tqdm.write(f"{folder / name}.jpg")
+
+
+def sheet(renderer: MitsubaRenderer, options: GalleryOptions) -> Image.Image:
     """Random v, the hard frames, and all buffers of the first of each.
 
     Radiance is shown in sRGB; a picture darker or brighter than usual is not adapted.
     """
     generator = torch.Generator().manual_seed(0)
-    random = torch.rand(configurations, renderer.dimensions, generator=generator)
+    random = torch.rand(options.configurations, renderer.dimensions, generator=generator)
     hard = renderer.hard_frames()
     tiles: list[tuple[str, Image.Image]] = []
     for title, frames in (("random", random), ("hard frame", hard)):
         for index, v in enumerate(tqdm(frames, desc=title, leave=False)):
             image = renderer.render_image(
-                v, resolution=resolution, samples_per_pixel=samples_per_pixel, seed=index
+                v,
+                resolution=options.resolution,
+                samples_per_pixel=options.samples_per_pixel,
+                seed=index,
             )
             tiles.append((f"{title} {index}", srgb_picture(image, 0.0)))
     for title, v in (("random 0", random[0]), ("hard frame 0", hard[0])):
-        buffers = renderer.image_buffers(v, resolution=resolution).cpu()
+        buffers = renderer.image_buffers(v, resolution=options.resolution).cpu()
         for name in renderer.layout.names:
             picture = buffer_picture(name, buffers[..., renderer.layout.slice(name)])
             tiles.append((f"{name}, {title}", picture))
-    return _grid(tiles, resolution)
+    return _grid(tiles, options.resolution)
 
 
 def buffer_picture(name: str, buffer: Tensor) -> Image.Image:
@@ -68,44 +102,9 @@ def _grid(tiles: list[tuple[str, Image.Image]], size: int) -> Image.Image:
     return image
 
 
-def main(arguments: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(
-        prog="ngi gallery",
-        description="Make a contact sheet of every scene: random configurations, hard frames and "
-        "buffers.",
-    )
-    known = scenes()
-    parser.add_argument("scenes", nargs="*", help=f"of {', '.join(sorted(known))}; default: all")
-    parser.add_argument("--folder", type=Path, default=Path("outputs/gallery"), help="where to")
-    parser.add_argument("--configurations", type=int, default=8, help="random v per scene")
-    parser.add_argument("--resolution", type=int, default=160, help="pixels per side")
-    parser.add_argument("--samples-per-pixel", type=int, default=64)
-    parser.add_argument("--backend", default="auto", help="auto, cuda, llvm or scalar")
-    options = parser.parse_args(arguments)
-    if unknown := set(options.scenes) - set(known):
-        parser.error(f"no scene {sorted(unknown)}; there are {sorted(known)}")
-    try:
-        _write_sheets(options, known)
-    except (ValueError, OSError, RuntimeError) as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
-    return 0
-
-
-def _write_sheets(options: argparse.Namespace, known: dict[str, dict[str, Any]]) -> None:
-    from ngi.render.mitsuba_renderer import MitsubaRenderer
-
-    options.folder.mkdir(parents=True, exist_ok=True)
-    for name in tqdm(options.scenes or sorted(known), desc="scenes"):
-        renderer = MitsubaRenderer(scene=read_scene(**known[name]), backend=options.backend)
-        picture = sheet(
-            renderer,
-            configurations=options.configurations,
-            resolution=options.resolution,
-            samples_per_pixel=options.samples_per_pixel,
-        )
-        picture.save(options.folder / f"{name}.jpg", quality=85)
-        tqdm.write(f"{options.folder / f'{name}.jpg'}")
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point of `ngi gallery`."""
+    return run_tool(write_sheets, GalleryOptions, "ngi gallery", arguments)
 
 
 if __name__ == "__main__":

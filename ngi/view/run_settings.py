@@ -85,8 +85,9 @@ def describe_scene(
 ) -> SceneDescription | None:
     """What varies in the run's scene; None where it is made of closed formulas.
 
-    path: of a scene in the authors' format; None: where the run's folder says it was, or, where it
-        is not there any more, the scene of that name. ValueError where there is none either.
+    path: of a scene in the authors' format. None: the scene is looked for where the run's folder
+        says that it was, and then among the known scenes, by its name
+    Raises ValueError where it is found nowhere.
     """
     name = settings["scene"]["name"]
     if made_by(settings, "renderer") is not mitsuba_renderer:
@@ -114,6 +115,8 @@ def _remembered_place(folder: Path) -> dict[str, Any] | None:
         place: dict[str, Any] = json.loads(path.read_text())
         if place["_target_"] not in READERS:
             raise ValueError(f"_target_ is {place['_target_']!r}, known are {list(READERS)}")
+        if not isinstance(where := place.get("folder", place.get("path")), str):
+            raise TypeError(f"it names {where!r} where the scene's folder belongs")
     except (ValueError, KeyError, TypeError) as error:
         raise ValueError(f"{path} is damaged ({error}); delete it") from error
     return place

@@ -1,4 +1,4 @@
-"""What one browser wants to see, and what of it has to be computed next; knows no browser."""
+"""What one browser wants to see, and which picture of it has to be computed next."""
 
 from __future__ import annotations
 

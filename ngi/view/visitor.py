@@ -193,7 +193,7 @@ class Visitor:
         v = ",".join(f"{number:.6g}" for number in self._panel.v)
         return shlex.join(
             [
-                *("python", "-m", "ngi.render", f"run={self._subject.folder}", f"v=[{v}]"),
+                *("ngi", "render", f"run={self._subject.folder}", f"v=[{v}]"),
                 *(f"resolution={self._panel.resolution}", "out=picture.png"),
             ]
         )

@@ -220,7 +220,7 @@ def test_everything_is_drawn(tmp_path: Path) -> None:
 
 def test_what_is_not_there_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([str(tmp_path)]) == 1
-    assert "python -m ngi.exploration_map writes it" in capsys.readouterr().err
+    assert "python -m ngi.studies.exploration_map writes it" in capsys.readouterr().err
     rows_of({"uniform": 1.0}).drop(columns="noise").to_csv(tmp_path / "exploration_map.csv")
     with pytest.raises(ValueError, match="it lacks \\['noise'\\]"):
         read_table(tmp_path)

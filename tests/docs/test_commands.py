@@ -23,7 +23,7 @@ SHOWN = [(page, command) for page in PAGES for command in commands(page) if "ngi
 OPTIONS = {
     "view": ("ngi.view.__main__", "ViewOptions"),
     "render": ("ngi.view.picture", "PictureOptions"),
-    "video": ("ngi.video", "VideoOptions"),
+    "video": ("ngi.view.video", "VideoOptions"),
     "export": ("ngi.view.export", "ExportOptions"),
 }
 OPENED = r"\brun=(outputs/\S+)"

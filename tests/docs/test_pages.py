@@ -59,13 +59,7 @@ def test_every_option_has_its_place_in_the_reference(documentation: ModuleType) 
 def test_every_verb_has_its_place_in_the_reference(documentation: ModuleType) -> None:
     page = documentation.commands()
     for name, verb in VERBS.items():
-        assert f"| `ngi {name}` |" in page
-        module = verb.module.removesuffix(".__main__")
-        assert f"`python -m {module}`" in page
-        file = ROOT / module.replace(".", "/")
-        alone = file.with_suffix(".py")
-        source = alone if alone.exists() else file / "__main__.py"
-        assert '__name__ == "__main__"' in source.read_text(), "python -m would do nothing"
+        assert f"| `ngi {name}` | {verb.help} |" in page
 
 
 def test_the_citation_is_of_this_version() -> None:

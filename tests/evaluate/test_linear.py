@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 import torch
 
+from ngi.commands.metrics import main
 from ngi.evaluate import Evaluation, Evaluator, Lpips, ReferenceCache
 from ngi.evaluate.linear import read_linear
 from ngi.files.durable import DamagedError
 from ngi.machine.backend import activate, mi
-from ngi.metrics import main
 from ngi.render.exr import read_exr, write_exr
 from ngi.train import train
 from tests.learn.command_line import SMALL

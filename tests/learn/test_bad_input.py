@@ -10,6 +10,13 @@ from tests.learn.command_line import BRIEF, run
 from tests.learn.forked import configuration
 
 
+class Blind(torch.nn.Module):
+    """A network that makes no whole images."""
+
+    def __init__(self, **_: object) -> None:
+        super().__init__()
+
+
 @pytest.mark.parametrize(
     ("override", "words"),
     [
@@ -48,6 +55,8 @@ def test_an_error_of_the_command_line_ends_it(
             ["schedule.warmup_steps: 30", "budget.steps: 12"],
         ),
         (["averaging=exponential", "averaging.decay=1"], ["averaging.decay: 1"]),
+        (["model._target_=torch.nn.ReLU"], ["model: ReLU", "unexpected", "hidden_features"]),
+        ([f"model._target_={__name__}.Blind"], ["model: Blind has no method render"]),
     ],
 )
 def test_each_error_names_its_key_and_value(

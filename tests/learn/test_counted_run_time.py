@@ -10,7 +10,7 @@ import pytest
 import torch
 from omegaconf import DictConfig
 
-from ngi import costs as costs_command
+from ngi.commands import costs as costs_command
 from ngi.config.build import run_components
 from ngi.learn import CostFile, TrainingStream
 from ngi.machine.usage import COLUMNS
@@ -165,7 +165,7 @@ def test_costs_decide_what_a_run_is_and_their_path_does_not(
 
 
 def test_what_is_not_measured_is_asked_for(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=r"costs\.json lacks 'training-.*python -m ngi\.costs"):
+    with pytest.raises(ValueError, match=r"costs\.json lacks 'training-.*`ngi costs`"):
         train(model_clock(tmp_path))
     assert not (tmp_path / "run").exists()
 

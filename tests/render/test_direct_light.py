@@ -9,10 +9,10 @@ from ngi.machine.backend import llvm_problem
 from ngi.patches import BufferLayout
 from ngi.render import AnalyticRenderer
 from ngi.render.direct_light import light_points
-from ngi.render.measure import counted_compilations
 from ngi.render.mitsuba_renderer import MitsubaRenderer
 from ngi.render.tracing import subpixel_points
 from ngi.scene import read_scene
+from ngi.studies.benchmark.measure import counted_compilations
 from tests.learn.command_line import SMALL, run
 from tests.render.optics import ORIGIN, on_plane, rays, rectangle, unit, write_scene
 

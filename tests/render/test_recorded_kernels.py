@@ -9,9 +9,9 @@ import torch
 from PIL import Image
 
 from ngi.machine.backend import dr, llvm_problem
-from ngi.render.measure import counted_compilations
 from ngi.render.mitsuba_renderer import MitsubaRenderer
 from ngi.scene import read_scene
+from ngi.studies.benchmark.measure import counted_compilations
 
 SCENE = """<scene version="3.0.0">
 <integrator type="path"><integer name="max_depth" value="4"/></integrator>

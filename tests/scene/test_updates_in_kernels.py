@@ -6,10 +6,10 @@ import torch
 from PIL import Image
 
 from ngi.machine.backend import activate, llvm_problem, mi
-from ngi.render.measure import counted_compilations, counted_kernels
 from ngi.render.mitsuba_renderer import MitsubaRenderer
 from ngi.scene import read_scene
 from ngi.scene.jit_variables import address, aligned
+from ngi.studies.benchmark.measure import counted_compilations, counted_kernels
 from tests.scene import (
     test_updates_of_appearance,
     test_updates_of_light_and_view,

@@ -110,7 +110,7 @@ def picture(page: playwright.Page) -> np.ndarray:
 def command(page: playwright.Page) -> str:
     """The command line that the page shows."""
     values = [field.input_value() for field in page.locator("input.mantine-TextInput-input").all()]
-    return next(value for value in values if value.startswith("python -m ngi.render"))
+    return next(value for value in values if value.startswith("ngi render"))
 
 
 def set_slider(page: playwright.Page, number: int, value: float) -> None:
@@ -133,7 +133,7 @@ def wait_until_changed(page: playwright.Page, before: np.ndarray) -> np.ndarray:
 def rendered(folder: Path, options: list[str]) -> np.ndarray:
     out = folder / "expected.png"
     subprocess.run(
-        [sys.executable, "-m", "ngi.render", *options, f"out={out}"],
+        [sys.executable, "-m", "ngi", "render", *options, f"out={out}"],
         cwd=folder,
         env=environment(folder),
         check=True,
@@ -169,7 +169,7 @@ def test_the_page_shows_what_is_computed_without_it(
         for number in (1, 2, 3):
             set_slider(page, number, 0.05 * number)
             before = wait_until_changed(page, before)
-        options = shlex.split(command(page))[3:-1]
+        options = shlex.split(command(page))[2:-1]
         assert "v=[0.05,0.1,0.15]" in options
         page.wait_for_timeout(1000)
         np.testing.assert_array_equal(picture(page), rendered(trained, options))
@@ -201,7 +201,7 @@ def test_the_mouse_walks_the_camera_within_its_box(
         assert end[:-1] != start[:-1]
         assert end[-1] == start[-1]  # the lamp, which the mouse does not move
         assert all(0 <= component <= 1 for component in end)
-        options = shlex.split(command(page))[3:-1]
+        options = shlex.split(command(page))[2:-1]
         np.testing.assert_array_equal(picture(page), rendered(tmp_path, options))
 
 

@@ -1,4 +1,4 @@
-"""`python -m ngi.export` on runs of closed formulas; ONNX Runtime is the independent judge."""
+"""`ngi export` on runs of closed formulas; ONNX Runtime is the independent judge."""
 
 import json
 import subprocess

@@ -1,4 +1,4 @@
-"""`python -m ngi.render` on runs of closed formulas, as a user starts it."""
+"""`ngi render` on runs of closed formulas, as a user starts it."""
 
 import contextlib
 import io
@@ -34,7 +34,7 @@ def render(folder: Path, *options: str) -> tuple[int, str]:
 
 def render_as_users_do(folder: Path, *options: str) -> tuple[int, str]:
     done = subprocess.run(
-        [sys.executable, "-m", "ngi.render", "run=run", *options],
+        [sys.executable, "-m", "ngi", "render", "run=run", *options],
         capture_output=True,
         text=True,
         cwd=folder,
@@ -98,9 +98,9 @@ def test_exr_files_hold_linear_radiance(tmp_path: Path) -> None:
         (("out=picture.jpg",), ".png"),
         (("out=nowhere/picture.png",), "no folder nowhere"),
         (("resolution=0",), "at least 1"),
-        (("resolution=many",), "'resolution=many' is wrong: resolution is an integer"),
-        (("reference=64:",), "'reference=64:' is wrong: reference is an integer"),
-        (("v=[0.5,",), "'v=[0.5,' is wrong: v is a list of numbers"),
+        (("resolution=many",), "'resolution=many' is wrong: input should be a valid integer"),
+        (("reference=64:",), "'reference=64:' is wrong: input should be a valid integer"),
+        (("v=[0.5,",), "'v=[0.5,' is wrong: input should be a valid number"),
         (("colour=red",), "'colour' is no option"),
     ],
 )

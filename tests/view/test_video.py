@@ -1,4 +1,4 @@
-"""`python -m ngi.video` on runs of closed formulas, as a user starts it."""
+"""`ngi video` on runs of closed formulas, as a user starts it."""
 
 import json
 import subprocess
@@ -12,8 +12,8 @@ import torch
 from numpy.typing import NDArray
 from PIL import Image
 
-from ngi.video import main
 from ngi.view import film
+from ngi.view.video import main
 from tests.learn.command_line import environment, run
 
 av = pytest.importorskip("av", reason="the extra 'video' is missing")
@@ -70,7 +70,7 @@ def test_frames_are_the_pictures_of_the_render_command(trained: Path) -> None:
     """Ten frames along the hard frames are these, which training has written, too."""
     options = ("run=run", "path=hard_frames", "seconds=10", "frames_per_second=1")
     done = subprocess.run(
-        [sys.executable, "-m", "ngi.video", *options, f"resolution={SIZE}"],
+        [sys.executable, "-m", "ngi", "video", *options, f"resolution={SIZE}"],
         capture_output=True,
         text=True,
         cwd=trained,
@@ -209,7 +209,7 @@ def test_pixels_that_a_path_made_nan_come_from_the_other_half(
         (("beside=[method=other,run]",), "beside: run is there already"),
         (("beside=started",), "result.json: no such file; the run is not finished yet"),
         (("beside=hostile",), "path_tracing.denoiser._target_ is 'os.system'"),
-        (("beside=3",), "beside: 3; expected a folder"),
+        (("beside=3",), "3/settings.json: no such file"),
         (("path=zigzag",), "path: 'zigzag' is neither camera, hard_frames, static nor a file"),
         (("path=short.txt",), "path: short.txt[1]: [0.5, 0.5]; expected 3 numbers from 0 to 1"),
         (("path=outside.txt",), "path: outside.txt[0]: [0, 2, 0]; expected 3 numbers"),
@@ -224,7 +224,7 @@ def test_pixels_that_a_path_made_nan_come_from_the_other_half(
         (("reference=7",), "reference: 7; it has to be an even number"),
         (("seconds=1",), "seconds: 1.0; a video has two frames at least"),
         (("seconds=nan",), "seconds: nan"),
-        (("seconds=.inf",), "seconds: inf"),
+        (("seconds=inf",), "seconds: inf"),
     ],
 )
 def test_mistakes_are_named(

@@ -168,22 +168,4 @@ class SpecularTransmission(Number):
     kind = "spec_trans"
 
 
-NUMBERS: tuple[type[RangedVariable], ...] = (
-    FieldOfView,
-    Cone,
-    RefractiveIndex,
-    AlphaU,
-    AlphaV,
-    FirstColour,
-    SecondColour,
-    Metallic,
-    Specular,
-    SpecularTint,
-    Anisotropic,
-    Sheen,
-    SheenTint,
-    Clearcoat,
-    ClearcoatGloss,
-    Flatness,
-    SpecularTransmission,
-)
+NUMBERS: tuple[type[RangedVariable], ...] = (Cone, *Number.__subclasses__())

@@ -47,13 +47,13 @@ class Objects:
         return name
 
     def id_of(self, element: Element, *, like: str) -> str:
-        """The element's id; one like the proposed one where it has none."""
+        """The element's id. An element without an id gets a new one, similar to `like`."""
         if "id" not in element.attrib:
             element.set("id", self.new_id(like))
         return element.attrib["id"]
 
     def copy(self, element: Element) -> Element:
-        """A copy of an element, in the same lines, whose ids and those in it are new ones."""
+        """A copy of an element, with new ids. Messages name the lines of the original."""
         new = copy.deepcopy(element)
         self.source.note_copy(element, new)
         for child in new.iter():

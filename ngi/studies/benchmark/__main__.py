@@ -1,18 +1,18 @@
-"""Entry point of `ngi benchmark` and `python -m ngi.benchmark`.
+"""Entry point of `ngi benchmark`.
 
 The processes that parts start import this file: what they do not need is imported in functions.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import ngi.studies.benchmark
+from ngi.config.options import option, run_tool
 from ngi.machine.memory import keep_freed_memory
 from ngi.scene import scenes
 from ngi.studies.benchmark.figures import Figure
@@ -24,43 +24,65 @@ SHORT = ("living-room", "salon-25", "sphere-caustic")
 """Scenes of a run that names neither parts nor scenes, which is to take a quarter of an hour."""
 
 
+@dataclass
+class BenchmarkOptions:
+    parts: list[str] | None = option("what to measure, see above; none: everything", None)
+    scenes: list[str] | None = option("scenes to render", None)
+    release: list[str] | None = option("folders of the authors' scenes to render", None)
+    samples_per_pixel: str | None = option(f"a number, or '{TRAINING}'", None)
+    patches: int | None = option("rendered by compilations and memory", None)
+    repeats: int = option("timings per figure", 20)
+    seconds: float = option("of timings per scene", 60.0)
+    markdown: bool = option("print the tables as Markdown too", False)
+    output: str = option("file to write", "outputs/benchmark.json")
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point of `ngi benchmark` and `python -m ngi.benchmark`."""
+    """Entry point of `ngi benchmark`."""
     from ngi.studies.benchmark.parts import PARTS
 
-    parser = _parser(PARTS)
-    chosen = parser.parse_args(arguments)
-    parts = {part.name: part for part in PARTS}
-    for kind, names, known in (("part", chosen.parts, parts), ("scene", chosen.scenes, scenes())):
+    known = [f"    {part.name:<14}{part.help}" for part in PARTS]
+    BenchmarkOptions.__doc__ = "\n".join([f"{ngi.studies.benchmark.__doc__}\nparts:", *known])
+    return run_tool(benchmark, BenchmarkOptions, "ngi benchmark", arguments)
+
+
+def benchmark(chosen: BenchmarkOptions) -> None:
+    """Measures, prints and writes. Raises ValueError and FileNotFoundError for what is not there,
+    before anything is measured.
+    """
+    from ngi.studies.benchmark.parts import PARTS
+
+    parts, given = {part.name: part for part in PARTS}, chosen.parts or []
+    for kind, names, known in (("part", given, parts), ("scene", chosen.scenes or [], scenes())):
         if unknown := sorted(set(names) - set(known)):
-            parser.error(f"no {kind} {', '.join(unknown)}; there are {', '.join(sorted(known))}")
-    try:
-        named = [*shipped(chosen.scenes), *map(released, chosen.release)]
-    except FileNotFoundError as error:
-        parser.error(f"--release {error}")
+            there = ", ".join(sorted(known))
+            raise ValueError(f"no {kind} {', '.join(unknown)}; there are {there}")
+    for key in ("repeats", "patches"):
+        if (number := getattr(chosen, key)) is not None and number < 1:
+            raise ValueError(f"{key}: {number} is not positive")
+    named = [*shipped(chosen.scenes or []), *map(released, map(Path, chosen.release or []))]
     every = one_per_folder()
-    if not chosen.parts and not named:
+    if not given and not named:
         others = sorted({*every} - {*SHORT})
         print(f"left out: the scenes {', '.join(others)}; name parts or scenes to measure them")
         every = list(SHORT)
-    measured = [parts[name] for name in chosen.parts] or PARTS
-    figures = _measure(measured, chosen, named, every)
+    figures = _measure([parts[name] for name in given] or PARTS, chosen, named, every)
     if chosen.markdown:
         print(markdown(figures))
-    return 0
 
 
 def _measure(
-    parts: Sequence[Part], chosen: argparse.Namespace, named: list[Scene], every: list[str]
+    parts: Sequence[Part], chosen: BenchmarkOptions, named: list[Scene], every: list[str]
 ) -> list[Figure]:
     """named: the scenes asked for; every: those of a part that renders all, where none were."""
     keep_freed_memory()
+    samples = _samples(chosen.samples_per_pixel)
     figures: list[Figure] = []
     try:
         for part in parts:
             options = Options(
                 scenes=named or shipped(every if part.scenes is None else part.scenes),
-                samples_per_pixel=chosen.samples_per_pixel,
+                samples_per_pixel=samples,
                 repeats=chosen.repeats,
                 seconds=chosen.seconds,
                 patches=chosen.patches,
@@ -70,7 +92,7 @@ def _measure(
                 figures.append(figure)  # one at a time: what was measured before an error stays
             print(f"{table(figures[start:])}\n", flush=True)
     finally:
-        _write(figures, chosen.output)
+        _write(figures, Path(chosen.output))
     return figures
 
 
@@ -84,34 +106,12 @@ def _write(figures: Sequence[Figure], output: Path) -> None:
     print(f"written to {output}")
 
 
-def _parser(parts: Sequence[Part]) -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="ngi benchmark",
-        description=ngi.studies.benchmark.__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        epilog="\n".join(["parts:", *(f"  {part.name:<14}{part.help}" for part in parts)]),
-    )
-    add = parser.add_argument
-    add("parts", nargs="*", metavar="PART", help="what to measure, see below; everything")
-    add("--scenes", nargs="+", default=[], metavar="NAME", help="scenes to render")
-    add("--release", nargs="+", default=[], type=Path, metavar="FOLDER", help="the authors' scenes")
-    add("--samples-per-pixel", type=_samples, metavar="N", help=f"a number, or '{TRAINING}'")
-    add("--patches", type=_positive, metavar="N", help="rendered by compilations and memory")
-    add("--repeats", type=_positive, default=20, metavar="N", help="timings per figure; 20")
-    add("--seconds", type=float, default=60.0, metavar="S", help="of timings per scene; 60")
-    add("--markdown", action="store_true", help="print the tables as Markdown too")
-    add("--output", type=Path, default=Path("outputs/benchmark.json"), metavar="FILE")
-    return parser
-
-
-def _positive(text: str) -> int:
-    if (number := int(text)) < 1:
-        raise argparse.ArgumentTypeError(f"{number} is not positive")
-    return number
-
-
-def _samples(text: str) -> int | str:
-    return text if text == TRAINING else _positive(text)
+def _samples(text: str | None) -> int | str | None:
+    if text in (None, TRAINING):
+        return text
+    if not text.isdecimal() or not int(text):
+        raise ValueError(f"samples_per_pixel: '{text}' is neither positive nor '{TRAINING}'")
+    return int(text)
 
 
 if __name__ == "__main__":

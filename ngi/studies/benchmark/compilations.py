@@ -11,10 +11,10 @@ from typing import Any
 
 from tqdm import tqdm
 
-from ngi.render.measure import KernelCounts, counted_kernels
 from ngi.studies.benchmark import PATCHES
 from ngi.studies.benchmark.batches import Batches
 from ngi.studies.benchmark.figures import Figure, figure
+from ngi.studies.benchmark.measure import KernelCounts, counted_kernels
 from ngi.studies.benchmark.remote import remote
 from ngi.studies.benchmark.scenes import Scene
 

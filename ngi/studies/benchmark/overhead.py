@@ -6,10 +6,10 @@ from dataclasses import replace
 from functools import partial
 
 from ngi.machine.timing import alternated, repeated
-from ngi.render.measure import STEPS, FixedLaunch, timed_steps
 from ngi.studies.benchmark import PATCH_SIZE
 from ngi.studies.benchmark.batches import Batches
 from ngi.studies.benchmark.figures import Figure, figure, ratio
+from ngi.studies.benchmark.measure import STEPS, FixedLaunch, timed_steps
 from ngi.studies.benchmark.remote import remote
 from ngi.studies.benchmark.scenes import Scene
 

@@ -1,4 +1,4 @@
-"""Entry point: `python -m ngi.exploration_map --help`."""
+"""Entry point: `python -m ngi.studies.exploration_map --help`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs the map; returns the exit status."""
     parser = argparse.ArgumentParser(
-        prog="python -m ngi.exploration_map",
+        prog="python -m ngi.studies.exploration_map",
         description="When does exploration pay? Trains every sampler, target and acceptance rule, "
         "with and without reuse, on closed-form scenes with a knob for each cause, and writes "
         "exploration_map.csv. Goes on where it was interrupted. "

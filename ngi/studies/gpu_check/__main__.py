@@ -1,4 +1,4 @@
-"""Entry point of `ngi gpu-check` and `python -m ngi.gpu_check`."""
+"""Entry point of `ngi gpu-check`."""
 
 from __future__ import annotations
 

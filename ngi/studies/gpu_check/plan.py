@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from ngi.doctor import CHECKS, examine, report
+from ngi.commands.doctor import CHECKS, examine, report
 from ngi.studies.benchmark.inference import inference
 from ngi.studies.benchmark.part import Options, Part
 from ngi.studies.benchmark.parts import PARTS

@@ -2,36 +2,57 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import pandas as pd
 from tqdm import tqdm
 
+from ngi.config.options import option, run_tool
 from ngi.files.durable import write_atomically
 from ngi.machine.memory import keep_freed_memory
 from ngi.studies.stability.case import Case, Row, attempt
 
 
+@dataclass
+class StabilityOptions:
+    """Runs extreme and stiff cases on every sampler, precision and backend at hand and says of
+    each: whether all numbers are finite, the error against the ordinary case or a closed form, what
+    was done about it (guard, clamp, resample, refuse), the verdict.
+    """
+
+    groups: list[str] | None = option("of cases; none: all", None)
+    matching: str = option("only cases with this in their names", "")
+    output: str = option(
+        "folder for stability.csv and .md, of a part of the cases stability_part.*",
+        "outputs/stability",
+    )
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point of `ngi stability`; 1 where a case failed, 2 for a wrong command."""
+    return run_tool(stability, StabilityOptions, "ngi stability", arguments)
+
+
+def stability(chosen: StabilityOptions) -> int:
+    """Prints and writes the table; ValueError where there is no such group or case."""
     from ngi.studies.stability.groups import GROUPS
 
-    parser = _parser(GROUPS)
-    chosen = parser.parse_args(arguments)
-    if unknown := sorted(set(chosen.groups) - set(GROUPS)):
-        parser.error(f"no group {', '.join(unknown)}; there are {', '.join(GROUPS)}")
+    names = chosen.groups or [*GROUPS]
+    if unknown := sorted(set(names) - set(GROUPS)):
+        raise ValueError(f"no group {', '.join(unknown)}; there are {', '.join(GROUPS)}")
     keep_freed_memory()
-    groups = {name: GROUPS[name] for name in chosen.groups or GROUPS}
+    groups = {name: GROUPS[name] for name in names}
     rows = run(groups, matching=chosen.matching)
     if not rows:
-        names = ", ".join(case.name for cases in groups.values() for case in cases)
-        parser.error(f"no case has '{chosen.matching}' in its name; there are {names}")
+        known = ", ".join(case.name for cases in groups.values() for case in cases)
+        raise ValueError(f"no case has '{chosen.matching}' in its name; there are {known}")
     table = pd.DataFrame([row.columns() for row in rows])
-    file = chosen.output / ("stability_part" if chosen.groups or chosen.matching else "stability")
-    chosen.output.mkdir(parents=True, exist_ok=True)
+    folder = Path(chosen.output)
+    file = folder / ("stability_part" if chosen.groups or chosen.matching else "stability")
+    folder.mkdir(parents=True, exist_ok=True)
     write_atomically(file.with_suffix(".csv"), table.to_csv(index=False).encode())
     text = markdown(table)
     write_atomically(file.with_suffix(".md"), text.encode())
@@ -69,27 +90,6 @@ def markdown(table: pd.DataFrame) -> str:
         shown["finite"] = ["yes" if finite else "NO" for finite in shown["finite"]]
         parts.append(f"### {group}\n\n{shown.fillna('').to_markdown(index=False)}")
     return "\n\n".join(parts)
-
-
-def _parser(groups: Mapping[str, Sequence[Case]]) -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="ngi stability",
-        description="Runs extreme and stiff cases on every sampler, precision and backend at hand "
-        "and says of each: whether all numbers are finite, the error against the ordinary case or "
-        "a closed form, what was done about it (guard, clamp, resample, refuse), the verdict.",
-    )
-    parser.add_argument(
-        "groups", nargs="*", metavar="group", help=f"of cases, by default all: {', '.join(groups)}"
-    )
-    parser.add_argument("--matching", default="", help="only cases with this in their names")
-    parser.add_argument(
-        "--output",
-        type=Path,
-        default=Path("outputs/stability"),
-        help="folder for stability.csv and stability.md, of a part of the cases stability_part.* "
-        "(default: %(default)s)",
-    )
-    return parser
 
 
 if __name__ == "__main__":

@@ -3,8 +3,8 @@ from pathlib import Path
 import pytest
 
 from ngi.machine.backend import activate, dr, llvm_problem, mi
-from ngi.render.measure import KernelCounts, counted_kernels
 from ngi.studies.benchmark import compilations
+from ngi.studies.benchmark.measure import KernelCounts, counted_kernels
 from ngi.studies.benchmark.remote import remote
 from ngi.studies.benchmark.scenes import shipped
 

@@ -4,11 +4,10 @@ import pytest
 import torch
 
 from ngi.machine.backend import activate, llvm_problem
-from ngi.render import measure
-from ngi.render.measure import STEPS, FixedLaunch, counted_kernels, timed_steps
 from ngi.scene.variable_scene import VariableScene
-from ngi.studies.benchmark import PATCH_SIZE, PATCHES, overhead
+from ngi.studies.benchmark import PATCH_SIZE, PATCHES, measure, overhead
 from ngi.studies.benchmark.batches import Batches
+from ngi.studies.benchmark.measure import STEPS, FixedLaunch, counted_kernels, timed_steps
 from ngi.studies.benchmark.scenes import shipped
 
 [CORNELL_BOX] = shipped(["cornell-box"])

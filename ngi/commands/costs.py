@@ -157,7 +157,7 @@ def _main(config: DictConfig) -> None:
 
 
 def main() -> None:
-    """Entry point of `ngi costs` and `python -m ngi.costs`."""
+    """Entry point of `ngi costs`."""
     register()
     folder = cache_folder() / "costs"
     places = (f"hydra.{mode}.dir={folder}" for mode in ("run", "sweep"))

@@ -1,7 +1,7 @@
 import pytest
 
-from ngi import doctor
-from ngi.doctor import Finding
+from ngi.commands import doctor
+from ngi.commands.doctor import Finding
 
 
 def test_every_missing_thing_comes_with_what_brings_it() -> None:

@@ -9,7 +9,7 @@ from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass
 from os.path import relpath
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ngi.config.options import option, run_tool
 
@@ -39,7 +39,7 @@ class VideoOptions:
         "camera",
     )
     hard_frame: int = option("of path=static: which one", 0)
-    beside: Any = option("another run's folder of the scene, or [FOLDER,FOLDER]", None)
+    beside: list[str] | None = option("folders of other runs of the scene, [FOLDER,FOLDER]", None)
     reference: int = option("samples per pixel, an even number, of path-traced frames beside it", 0)
     seconds: float = option("how long", 8.0)
     frames_per_second: int = option("of the video", 24)
@@ -96,7 +96,7 @@ def _film(options: VideoOptions, stack: ExitStack) -> Film:
 
     scene = None if options.scene is None else Path(options.scene)
     runs: list[TrainedRun | PathTracedRun] = []
-    for folder in (Path(options.run), *_beside(options.beside)):
+    for folder in map(Path, (options.run, *(options.beside or ()))):
         if folder.resolve() in (run.folder.resolve() for run in runs):
             raise ValueError(f"beside: {folder} is there already")
         run = open_run(folder, scene_path=scene)
@@ -116,13 +116,6 @@ def _film(options: VideoOptions, stack: ExitStack) -> Film:
         samples=options.reference,
         exposure=options.exposure,
     )
-
-
-def _beside(value: Any) -> list[Path]:
-    folders = [] if value is None else value if isinstance(value, list) else [value]
-    if not all(isinstance(folder, str) for folder in folders):
-        raise ValueError(f"beside: {value}; expected a folder or a list of folders")
-    return [Path(folder) for folder in folders]
 
 
 def _labels(folders: Sequence[Path]) -> list[str]:

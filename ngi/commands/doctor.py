@@ -1,11 +1,7 @@
-"""Says what this machine has for rendering and training, and how to get what is missing.
-
-`ngi doctor`. Exit status 0 when the program can run here, 1 when it can't.
-"""
+"""Says what this machine has for rendering and training: `ngi doctor`."""
 
 from __future__ import annotations
 
-import argparse
 import os
 import platform
 import shutil
@@ -16,7 +12,16 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from ngi.config.options import run_tool
 from ngi.machine.provenance import LIBRARIES
+
+
+@dataclass
+class DoctorOptions:
+    """Says what this machine has for rendering and training, and how to get what is missing.
+
+    Exit status 0 when the program can run here, 1 when it can't.
+    """
 
 
 @dataclass(frozen=True)
@@ -151,13 +156,16 @@ def report(findings: Sequence[Finding]) -> str:
     return "\n".join(lines)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point of `ngi doctor` and `python -m ngi.doctor`."""
-    parser = argparse.ArgumentParser(prog="ngi doctor", description=__doc__)
-    parser.parse_args(arguments)
+def doctor(_: DoctorOptions) -> int:
+    """Prints the report; the exit status."""
     findings = [examine(check) for check in CHECKS]
     print(report(findings))
     return int(any(f.required and not f.present for f in findings))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point of `ngi doctor`."""
+    return run_tool(doctor, DoctorOptions, "ngi doctor", arguments)
 
 
 if __name__ == "__main__":

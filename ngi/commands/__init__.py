@@ -1,0 +1,1 @@
+"""Verbs of the command line that stand on all the rooms, beside `ngi.train`."""
