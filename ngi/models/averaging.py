@@ -47,6 +47,6 @@ class _CountedByTheHost(AveragedModel):
 
     def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> Self:
         count = self.n_averaged
-        super()._apply(fn, recurse)
+        super()._apply(fn, recurse)  # type: ignore[no-untyped-call]
         self.n_averaged = count
         return self

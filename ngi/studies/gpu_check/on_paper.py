@@ -55,7 +55,7 @@ class Counted(TorchDispatchMode):
     """Counts what is launched while it lasts, views left out."""
 
     def __init__(self) -> None:
-        super().__init__()
+        super().__init__()  # type: ignore[no-untyped-call]
         self.launches = 0
         self.bytes = 0
         self.operations = 0
