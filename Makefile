@@ -7,7 +7,7 @@ SWEEPS := same_time preconditioning resolution target_function acceptance histog
 BUDGET ?= small
 OPTIONS ?=
 SCENE ?= living-room
-.PHONY: help setup demo view test report docs lint smoke benchmark doctor clean
+.PHONY: help setup demo view test report docs lint smoke benchmark gpu doctor clean
 
 help: ## list the commands
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 14
@@ -58,6 +58,9 @@ $(VENV)/.docs: $(VENV)/.complete
 
 benchmark: setup ## speed as ratios, with the machine's own limits measured beside: 15 minutes
 	@$(BIN)/ngi benchmark
+
+gpu: setup ## everything there is to find out on a GPU; goes on where it stopped: OPTIONS='--minutes 10'
+	@$(BIN)/ngi gpu-check $(OPTIONS)
 
 doctor: setup ## what this machine has, and how to get what is missing
 	@$(BIN)/ngi doctor

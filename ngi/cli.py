@@ -51,6 +51,11 @@ WAY = {
             "benchmark", "ngi.studies.benchmark.__main__", "how fast every part of the program is"
         ),
         Verb(
+            "gpu-check",
+            "ngi.studies.gpu_check.__main__",
+            "everything there is to find out on a GPU, in parts",
+        ),
+        Verb(
             "stability", "ngi.studies.stability.__main__", "what becomes of extreme and stiff cases"
         ),
     ),

@@ -21,6 +21,7 @@ from ngi.config.outline import only_bootstrap, outline
 from ngi.config.values import check_values
 from ngi.files.resources import root
 from ngi.machine.memory import keep_freed_memory
+from ngi.machine.repeatable import make_repeatable
 
 if TYPE_CHECKING:
     from ngi import learn
@@ -41,6 +42,7 @@ def train(config: DictConfig) -> dict[str, Any]:
     from ngi.learn.code_change import heed_code_change
 
     keep_freed_memory()
+    make_repeatable()
     check_values(config)
     with learn.Interruption(of=config.run.folder) as interruption:
         budget = instantiate(config.budget)

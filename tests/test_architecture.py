@@ -218,7 +218,7 @@ def test_tests_mirror_the_program() -> None:
         path.relative_to(ROOT / "tests")
         for path in (ROOT / "tests").rglob("*")
         if path.is_dir() and any(path.glob("test_*.py"))
-    } - {Path("docs"), Path("fuzz"), Path("analysis")}
+    } - {Path("docs"), Path("fuzz"), Path("gpu"), Path("analysis")}
     assert rooms == {room for room in rooms if (ROOT / "ngi" / room).is_dir()}
 
 

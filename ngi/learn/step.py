@@ -19,9 +19,10 @@ from torch import Tensor, nn
 from torch.optim.swa_utils import AveragedModel
 
 from ngi.learn.batch import Batch, Feedback
+from ngi.learn.reading import read
 from ngi.learn.samples import Example
 from ngi.learn.scorer import Scorer, Scores
-from ngi.learn.step_guard import Attempt, StepGuard
+from ngi.learn.step_guard import Attempt, StepGuard, gradient_norm, largest_moment
 from ngi.learn.stream import TrainingStream
 from ngi.models import SampleLoss
 from ngi.patches import Patches
@@ -89,22 +90,29 @@ def training_step(
             loss = weighted.mean()
         optimizer.zero_grad()
         loss.backward()
-        attempt = Attempt(
-            batch=batch,
-            losses=losses.detach(),
-            loss=loss.detach(),
-            network=learner.network,
-            optimizer=optimizer,
+        with clock.phase("score"):
+            asked = () if scores is None else (scores[0](), scores[1])
+        # The one time that a step waits for the device: its time is training's.
+        norms = gradient_norm(learner.network), largest_moment(optimizer)
+        told, mean, norm, moment, *targets = read(losses, loss, *norms, *asked)
+        step = Step(float(mean), float(norm))
+        learner.guard.admit(
+            Attempt(
+                batch=batch,
+                losses=told,
+                loss=step.loss,
+                gradient_norm=step.gradient_norm,
+                largest_moment=float(moment),
+                network=learner.network,
+                optimizer=optimizer,
+            )
         )
-        gradient_norm = learner.guard.admit(attempt)
         optimizer.step()  # does nothing where the guard has taken the gradient back
         if learner.averaged is not None:
             learner.averaged.update_parameters(learner.network)
-        step = Step(loss.item(), gradient_norm)  # waits for the device: its time is training's
-    with clock.phase("score"):
-        proposed, current = (None, None) if scores is None else (scores[0](), scores[1])
     # The chains accept or refuse what they proposed; store and policy learn of the losses.
-    learner.stream.feedback(Feedback(losses.detach(), proposed, current))
+    proposed, current = targets or (None, None)
+    learner.stream.feedback(Feedback(told, proposed, current))
     return step
 
 

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -48,13 +47,15 @@ REFUSED_IN_A_ROW = 10
 class Attempt:
     """A step up to its backward pass.
 
-    losses: [n] of the batch's samples; loss: their weighted mean. Both without a graph, and not
-        looked at before the guard does: a GPU would be waited for.
+    losses: [n] of the batch's samples, on the CPU; loss: their weighted mean
+    gradient_norm: see the function of this name; largest_moment: likewise
     """
 
     batch: Batch
     losses: Tensor
-    loss: Tensor
+    loss: float
+    gradient_norm: float
+    largest_moment: float
     network: nn.Module
     optimizer: torch.optim.Optimizer
 
@@ -70,10 +71,24 @@ class Attempt:
         }
 
 
-def gradient_norm(parameters: Iterable[nn.Parameter]) -> float:
-    """L2 norm of the whole gradient; NaN or Inf where a part of it is so."""
-    gradients = [p.grad for p in parameters if p.grad is not None]
-    return float(torch.nn.utils.get_total_norm(gradients)) if gradients else 0.0
+def gradient_norm(network: nn.Module) -> Tensor:
+    """L2 norm of the whole gradient, []; NaN or Inf where a part of it is so."""
+    return _norm([p.grad for p in network.parameters() if p.grad is not None], 2.0)
+
+
+def largest_moment(optimizer: torch.optim.Optimizer) -> Tensor:
+    """Absolute value over all that it keeps of earlier gradients, []; NaN where one is."""
+    moments = [
+        value
+        for state in optimizer.state.values()
+        for name, value in state.items()
+        if name != "step" and isinstance(value, Tensor)
+    ]
+    return _norm(moments, math.inf)
+
+
+def _norm(tensors: list[Tensor], order: float) -> Tensor:
+    return torch.nn.utils.get_total_norm(tensors, order) if tensors else torch.zeros(())
 
 
 class StepGuard:
@@ -101,20 +116,19 @@ class StepGuard:
     def load_state_dict(self, state_dict: dict[str, Any]) -> None:
         self._log_norm = state_dict["log_norm"]
 
-    def admit(self, attempt: Attempt) -> float:
-        """Between the backward pass and the optimiser's step; the L2 norm that the gradient had.
+    def admit(self, attempt: Attempt) -> None:
+        """Between the backward pass and the optimiser's step.
 
         Raises FloatingPointError for one refusal too many.
         """
-        norm = gradient_norm(attempt.network.parameters())
-        moments_usable = math.isfinite(_largest_moment(attempt.optimizer))
+        norm = attempt.gradient_norm
+        moments_usable = math.isfinite(attempt.largest_moment)
         # `<=` is not so for NaN.
         if norm <= LARGEST_NORM and moments_usable and math.isfinite(attempt.loss):
             self._in_a_row = 0
             self._scale_down(attempt.network, norm)
         else:
             self._refuse(attempt, _cause(attempt, norm, moments_usable=moments_usable))
-        return norm
 
     def _refuse(self, attempt: Attempt, cause: str) -> None:
         attempt.optimizer.zero_grad(set_to_none=True)
@@ -167,14 +181,3 @@ def _cause(attempt: Attempt, norm: float, *, moments_usable: bool) -> str:
 
 def _usable(gradient: Tensor | None) -> bool:
     return gradient is None or float(torch.linalg.vector_norm(gradient)) <= LARGEST_NORM
-
-
-def _largest_moment(optimizer: torch.optim.Optimizer) -> float:
-    """Absolute value, over all that the optimiser keeps of earlier gradients; NaN where one is."""
-    moments = [
-        value
-        for state in optimizer.state.values()
-        for name, value in state.items()
-        if name != "step" and isinstance(value, Tensor)
-    ]
-    return float(torch.nn.utils.get_total_norm(moments, norm_type=math.inf)) if moments else 0.0

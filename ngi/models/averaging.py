@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Self
 
 from torch import Tensor, nn
 from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
@@ -30,8 +31,22 @@ def exponential_average(network: nn.Module, *, decay: float) -> AveragedModel:
         raise ValueError(f"averaging.decay: {decay}; expected at least 0, below 1")
 
     def average(averaged: list[Tensor], current: list[Tensor], steps: Tensor | int) -> None:
-        count = int(steps)
+        count = int(made.n_averaged)  # `steps` is the same, on the weights' device
         kept = min(decay, (1 + count) / (10 + count))
         get_ema_multi_avg_fn(kept)(averaged, current, steps)
 
-    return AveragedModel(network, multi_avg_fn=average).requires_grad_(False)  # type: ignore[arg-type]
+    made = _CountedByTheHost(network, multi_avg_fn=average)  # type: ignore[arg-type]
+    return made.requires_grad_(False)
+
+
+class _CountedByTheHost(AveragedModel):
+    """The number of its steps stays on the CPU wherever its weights go.
+
+    A GPU would be waited for three times a step.
+    """
+
+    def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> Self:
+        count = self.n_averaged
+        super()._apply(fn, recurse)  # type: ignore[no-untyped-call]
+        self.n_averaged = count
+        return self

@@ -63,7 +63,7 @@ def test_commands_are_shown() -> None:
 def test_verbs_modules_and_targets_exist(page: Path) -> None:
     targets = set(re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(), flags=re.MULTILINE))
     for command in commands(page):
-        if match := re.match(r"(?:[A-Z_]+=\S* )?ngi (\w+)", command):
+        if match := re.match(r"(?:[A-Z_]+=\S* )?ngi (\w[\w-]*)", command):
             assert match[1] in VERBS, command
         elif match := re.search(r"python -m ((?:ngi|analysis|tests)[\w.]*)", command):
             assert find_spec(match[1]), command

@@ -2,6 +2,7 @@
 
 import pytest
 import torch
+import torch.nn.functional as F
 from torch import Tensor
 from torch.autograd import gradcheck
 
@@ -13,7 +14,7 @@ from ngi.methods.anf.affinity import (
     weighted_mean,
 )
 from ngi.methods.anf.network import AffinityDenoiser
-from ngi.methods.anf.unet import UNet
+from ngi.methods.anf.unet import UNet, halved
 from ngi.patches import BufferLayout
 
 LAYOUT = BufferLayout(("position", "albedo"))
@@ -178,6 +179,18 @@ def test_a_unet_keeps_any_size_and_sees_around_the_corner(size: tuple[int, int])
     assert x.grad is not None
     assert x.grad[0, :, 6, 6].abs().sum() > 0
     assert x.grad[1:].abs().sum() == 0
+
+
+def test_pixels_are_halved_as_by_pytorch_bit_for_bit() -> None:
+    x = (4 * torch.rand(2, 3, 8, 6)).round()  # many of them are alike
+    pooled = []
+    for pool in (halved, lambda image: F.max_pool2d(image, 2)):
+        pixels = x.clone().requires_grad_()
+        y = pool(pixels)
+        (y * torch.arange(y.numel()).view_as(y)).sum().backward()
+        assert pixels.grad is not None
+        pooled.append((y, pixels.grad))
+    assert all(torch.equal(a, b) for a, b in zip(*pooled, strict=True))
 
 
 def test_it_learns_one_scene_by_heart() -> None:

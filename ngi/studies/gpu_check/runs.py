@@ -1,0 +1,116 @@
+"""Runs of the program in processes of their own, which are ended when the time is up."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from ngi.learn import read_checkpoint
+from ngi.studies.benchmark.figures import Figure, figure
+from ngi.studies.gpu_check.item import CutOffError, Outcome
+
+FORMULAS = (
+    *("renderer=analytic", "evaluation=smoke", "evaluation.count=1", "resolution=constant"),
+    *("budget=steps", "budget.steps=60", "run.linear_megabytes=0"),
+)
+"""Of short runs, all of which are on closed formulas, so that both devices see the same patches."""
+METHODS = {
+    "active_exploration": (
+        "renderer.patch_size=16",
+        "resolution.start=32",
+        "model=pixel_generator",
+    ),
+    "ours": (
+        *("renderer.patch_size=16", "resolution.start=32"),
+        *("schedule.warmup_steps=5", "~renderer.direct"),  # closed formulas always give it
+    ),
+    "cnsr": ("renderer.patch_size=16", "resolution.start=16", "sampler.chains=4"),
+    "anf": (
+        *("renderer.patch_size=16", "resolution.start=32", "sampler.chains=2"),
+        *("data.frames=2", "model.dilations=[1,2]", "reuse.store.capacity=8"),
+    ),
+}
+TIME_TO_END = 120.0
+"""Seconds for a run to write its checkpoint after it was asked to end."""
+
+
+def run(folder: Path, overrides: Sequence[str], *, seconds: float) -> dict[str, Any]:
+    """The result of the run in this folder, begun or gone on with.
+
+    Raises CutOffError where it takes more seconds, RuntimeError with what it said where it fails.
+    """
+    command = [sys.executable, "-m", "ngi.train", *overrides, f"run.folder={folder}"]
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    log = folder.with_suffix(".log")
+    with log.open("a") as output:
+        process = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT)
+        try:
+            status = process.wait(timeout=max(1.0, seconds))
+        except subprocess.TimeoutExpired as error:
+            process.send_signal(signal.SIGINT)
+            try:
+                process.wait(timeout=TIME_TO_END)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+            raise CutOffError(f"{folder} goes on next time") from error
+    if status != 0:
+        raise RuntimeError(f"{' '.join(command[1:])} failed:\n{log.read_text()[-2000:]}")
+    result: dict[str, Any] = json.loads((folder / "result.json").read_text())
+    return result
+
+
+def learning(method: str, folder: Path, seconds: float) -> Outcome:
+    """A method's short run on the processor, and twice on the GPU where there is one."""
+    overrides = (
+        *(*FORMULAS, f"method={method}", *METHODS[method]),
+        *("model.hidden_features=32", "model.hidden_layers=2"),
+        f"run.references={folder / 'references'}",
+    )
+    errors, weights = {}, {}
+    for name, accelerator in (("cpu", "cpu"), ("gpu", "auto"), ("again", "auto")):
+        place = folder / method / name
+        result = run(place, (*overrides, f"trainer.accelerator={accelerator}"), seconds=seconds)
+        errors[name] = result["metrics"]["hard"]["mape"]["mean"]
+        weights[name] = read_checkpoint(place / "last.ckpt")["state_dict"]
+    apart = 100 * abs(errors["gpu"] / errors["cpu"] - 1)
+    same = all(torch.equal(w, weights["again"][n]) for n, w in weights["gpu"].items())
+    return Outcome(
+        [
+            figure(f"{method}: error on the GPU against the processor's", [apart], "%", "≤ 5"),
+            figure(f"{method}: a run repeats bit for bit", [float(same)], "", "1"),
+        ]
+    )
+
+
+def training(folder: Path, overrides: Sequence[str], seconds: float) -> Outcome:
+    """A run at the paper's size; goes on where it was cut off."""
+    options = (*overrides, "run.checkpoint_seconds=30", "run.linear_megabytes=0")
+    result = run(folder, options, seconds=seconds)
+    return Outcome([replace(found, scene=folder.name) for found in training_figures(result)])
+
+
+def training_figures(result: dict[str, Any]) -> list[Figure]:
+    """Of a run's result."""
+    taken, metrics = result["run_seconds"], result["metrics"]["hard"]
+    return [
+        figure("run time", [taken], "s"),
+        figure("steps", [result["steps"]], ""),
+        figure("speed", [result["steps"] / taken], "steps/s"),
+        figure("paths", [result["paths_traced"] / taken / 1e6], "million/s"),
+        *(
+            figure(f"share of {phase}", [100 * spent / taken], "%")
+            for phase, spent in result["seconds"].items()
+            if spent > 0 and phase not in ("evaluate", "checkpoint")
+        ),
+        figure("MAPE", [metrics["mape"]["mean"]], ""),
+        figure("DSSIM", [metrics["dssim"]["mean"]], ""),
+    ]

@@ -1,0 +1,153 @@
+"""The GPU check is cut off, crashes and fails, and still comes to an end; and its dry run."""
+
+import json
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import torch
+
+from ngi.machine.provenance import provenance
+from ngi.studies.benchmark.figures import figure
+from ngi.studies.benchmark.scenes import one_per_folder
+from ngi.studies.gpu_check.__main__ import main, work
+from ngi.studies.gpu_check.item import CutOffError, Item, Outcome
+from ngi.studies.gpu_check.pixels import differences
+from ngi.studies.gpu_check.plan import Sizes, items
+from ngi.studies.gpu_check.record import Record
+from ngi.studies.gpu_check.runs import METHODS
+
+ABOUT = {
+    "machine": {"gpu": "Some GPU", "processor": "x", "backend": "cuda"},
+    "versions": {"torch": "2"},
+    "commit": "abc",
+    "dirty": False,
+}
+
+
+class Measuring:
+    """Items that note what is done to them. Each of `answers` is given or raised in turn."""
+
+    def __init__(self, *answers: Exception | BaseException | None) -> None:
+        self.answers: Iterator[Exception | BaseException | None] = iter(answers)
+        self.calls = 0
+
+    def __call__(self, _: float) -> Outcome:
+        self.calls += 1
+        answer = next(self.answers)
+        if answer is not None:
+            raise answer
+        return Outcome([figure("speed", [2.0], "m/s")], ["a note"])
+
+
+def checked(folder: Path, *every: Item, seconds: float = 1e6) -> Record:
+    """After one call, as of a new process."""
+    record = Record(folder, about=ABOUT)
+    work(every, record, end=time.monotonic() + seconds)
+    return Record(folder, about=ABOUT)
+
+
+def test_what_is_measured_is_not_measured_again(tmp_path: Path) -> None:
+    measure = Measuring(None)
+    item = Item("stage", "name", measure)
+    for _ in range(2):
+        record = checked(tmp_path, item)
+    assert measure.calls == 1
+    assert record.to_do([item]) == []
+    page = record.page.read_text()
+    assert "Some GPU" in page
+    assert "| speed | 2 m/s |" in page
+    assert "stage/name: a note" in page
+    kept = json.loads(record.path.read_text())["items"]["stage/name"]
+    assert kept["figures"][0]["median"] == 2
+    assert kept["machine"]["gpu"] == "Some GPU"
+
+
+def test_an_item_that_fails_leaves_the_others_and_is_tried_again(tmp_path: Path) -> None:
+    bad, good = Measuring(RuntimeError("no rays\nat all"), None), Measuring(None)
+    every = Item("a", "bad", bad), Item("b", "good", good)
+    record = checked(tmp_path, *every)
+    assert record.failed(every) == {"a/bad": "RuntimeError: no rays\nat all"}
+    assert "- a/bad: RuntimeError: no rays\n" in record.page.read_text()
+    record = checked(tmp_path, *every)
+    assert (bad.calls, good.calls) == (2, 1)
+    assert record.failed(every) == {}
+
+
+def test_an_item_that_kills_its_process_is_begun_twice_at_most(tmp_path: Path) -> None:
+    measure = Measuring(*[KeyboardInterrupt()] * 5)
+    item = Item("stage", "name", measure)
+    for _ in range(2):
+        with pytest.raises(KeyboardInterrupt):
+            checked(tmp_path, item)
+    record = checked(tmp_path, item)
+    record.write_page([item])
+    assert measure.calls == 2
+    assert "begun 2 times and never ended" in record.page.read_text()
+
+
+def test_one_that_goes_on_is_begun_as_often_as_it_is_cut_off(tmp_path: Path) -> None:
+    measure = Measuring(*[CutOffError()] * 3, KeyboardInterrupt(), KeyboardInterrupt(), None)
+    item = Item("stage", "name", measure, goes_on=True)
+    for _ in range(3):
+        assert checked(tmp_path, item).to_do([item]) == [item]
+    for _ in range(2):
+        with pytest.raises(KeyboardInterrupt):
+            checked(tmp_path, item)
+    assert checked(tmp_path, item).to_do([item]) == []
+    assert measure.calls == 6
+
+
+def test_nothing_is_begun_that_may_not_end_in_time(tmp_path: Path) -> None:
+    long, on = Measuring(None), Measuring(None)
+    every = Item("a", "", long, seconds=100), Item("b", "", on, seconds=100, goes_on=True)
+    checked(tmp_path, *every, seconds=50)
+    assert (long.calls, on.calls) == (0, 1)
+    checked(tmp_path / "late", *every, seconds=-1)
+    assert (long.calls, on.calls) == (0, 1)
+
+
+def test_pixels_differ_where_they_differ() -> None:
+    buffers, radiance = torch.rand(10, 10, 4), torch.rand(10, 10, 3) + 1
+    moved, brighter = buffers.clone(), radiance.clone()
+    moved[0, :3, 2] += 0.1
+    moved[1, 0, 0] = torch.nan
+    brighter[:5] *= 1.1
+    by_name = {f.name: f.median for f in differences((buffers, radiance), (moved, brighter))}
+    assert by_name["pixels whose buffers differ"] == pytest.approx(4)
+    assert by_name["pixels whose radiance differs"] == pytest.approx(50)
+    mean = 100 * (brighter.mean() / radiance.mean() - 1).item()
+    assert by_name["difference of mean radiance"] == pytest.approx(mean, rel=1e-3)
+
+
+def test_at_full_size_it_measures_every_scene_method_and_part(tmp_path: Path) -> None:
+    every = items(Sizes(), tmp_path, training_seconds=600)
+    keys = [item.key for item in every]
+    assert len(set(keys)) == len(keys)
+    assert {item.name for item in every if item.stage == "learning"} == set(METHODS)
+    assert sum(item.stage == "pixels" for item in every) == len(one_per_folder())
+    assert all(item.seconds < 600 for item in every)
+    assert {"training/living-room", "training/sphere-caustic", "benchmark/training"} <= set(keys)
+
+
+def test_without_a_gpu_it_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    if torch.cuda.is_available():
+        pytest.skip("there is a GPU")
+    assert main(["--output", str(tmp_path)]) == 1
+    assert "--dry-run" in capsys.readouterr().out
+
+
+def test_the_dry_run_goes_through_everything(tmp_path: Path) -> None:
+    assert main(["--dry-run", "--output", str(tmp_path)]) == 0
+    (file,) = tmp_path.rglob("gpu-check.json")
+    found = json.loads(file.read_text())["items"]
+    stages = {key.partition("/")[0] for key in found}
+    assert stages == {"doctor", "learning", "pixels", "benchmark", "training", "frames"}
+    assert all("figures" in entry for entry in found.values())
+    repeats = found["learning/active_exploration"]["figures"][1]
+    assert (repeats["name"], repeats["median"]) == (
+        "active_exploration: a run repeats bit for bit",
+        1,
+    )
+    assert {"commit", "versions"} <= provenance(backend="").keys() & found["doctor"].keys()
