@@ -19,34 +19,73 @@ DISTINCTIONS = ("reuse", "resolution", "model", "loss", "budget", "overrides", "
 def check_result(result: dict[str, Any]) -> None:
     """Touches everything that is read later, so that what lacks is known before any output.
 
-    Raises KeyError for what is missing, TypeError, naming key and value, for what is no number.
+    Raises KeyError for what is missing, TypeError, naming key and value, for what is no number or
+    no text, TypeError or AttributeError for what holds no entries.
     """
-    for key in ("scene_hash", "reference_hash", "patches_traced", "paths_traced"):
-        _ = result[key]
-    _ = result["protocol"]["name"], result["protocol"]["identity"]
-    for key in ("scene", "sampler", *DISTINCTIONS):
-        _ = result["label"][key]
     for recorded in result.get("logs", {}).values():
         _ = recorded["bytes"], recorded["sha256"]
+    for key in ("machine", "versions"):
+        _ = result.get(key, {}).items()
+    for version in result.get("commits", []):
+        _ = version["commit"], version.get("dirty")
+    for key, value in _texts(result):
+        if not isinstance(value, str):
+            raise TypeError(f"{key} is {value!r}, which is no text")
     for key, value in _numbers(result):
-        if not isinstance(value, int | float):
-            raise TypeError(f"{key} is {value!r}, which is no number")
+        if not isinstance(value, int | float) or not _fits(value):
+            raise TypeError(f"{key} is {str(value)!r:.80}, which is no number")
+
+
+def _texts(result: dict[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Key and value of what names, sorts or is compared."""
+    for key in ("scene_hash", "reference_hash"):
+        yield key, result[key]
+    for key in ("name", "identity"):
+        yield f"protocol.{key}", result["protocol"][key]
+    label = result["label"]
+    for key in ("scene", "sampler", *DISTINCTIONS):
+        yield f"label.{key}", label[key]
+    if label.get("method") is not None:
+        yield "label.method", label["method"]
+    yield "clock", result.get("clock", "wall")
+    yield "lpips_note", result.get("lpips_note") or ""
+    for number, frame in enumerate(result["frames"]):
+        yield f"frames.{number}.set", frame["set"]
 
 
 def _numbers(result: dict[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Key and value of what is calculated with; a metric that was not measured is left out."""
-    for key in ("seed", "run_seconds", "steps"):
+    """Key and value of what is calculated with; what was not measured is left out."""
+    for key in ("seed", "run_seconds", "steps", "patches_traced", "paths_traced"):
         yield key, result[key]
+    for key in ("wall_seconds", "energy_joules"):
+        if result.get(key) is not None:
+            yield key, result[key]
+    yield from _entries("seconds", result["seconds"])
+    frame = result.get("frame", {})
+    yield from _entries("frame.milliseconds", frame.get("milliseconds", {}))
+    yield from _entries("frame_seconds", result.get("frame_seconds", {}))
     for set_name in SETS:
         for metric in METRICS:
             if (summary := result["metrics"][set_name][metric]) is not None:
                 for statistic in ("mean", "worst5", "floor"):
                     yield f"metrics.{set_name}.{metric}.{statistic}", summary[statistic]
     for number, frame in enumerate(result["frames"]):
-        yield f"frames.{number}.index", frame["index"]
-        for metric in METRICS:
-            if frame[metric] is not None:
-                yield f"frames.{number}.{metric}", frame[metric]
+        for key in ("index", *METRICS):
+            if key == "index" or frame[key] is not None:
+                yield f"frames.{number}.{key}", frame[key]
+
+
+def _entries(key: str, values: dict[str, Any]) -> Iterator[tuple[str, Any]]:
+    return ((f"{key}.{name}", value) for name, value in values.items() if value is not None)
+
+
+def _fits(number: Any) -> bool:
+    """Whether it can be a number with a point: a text can, too, but no integer of 400 digits."""
+    try:
+        float(number)
+    except (TypeError, ValueError, OverflowError):
+        return False
+    return True
 
 
 def check_logs(folder: Path, result: dict[str, Any]) -> None:
@@ -94,9 +133,8 @@ def read_table(file: Path) -> pd.DataFrame:
     if not len(table):
         raise ValueError(f"{file.name} has no row")
     for column, values in table.select_dtypes(exclude="number").items():
-        row = pd.to_numeric(values, errors="coerce").isna() & values.notna()
+        row = values.notna() & ~values.map(_fits)
         line = int(row.to_numpy().argmax())
-        raise ValueError(
-            f"{file.name}, line {line + 2}: {column} is {values.iloc[line]!r}, which is no number"
-        )
+        found = f"{column} is {values.iloc[line]!r:.80}"
+        raise ValueError(f"{file.name}, line {line + 2}: {found}, which is no number")
     return table

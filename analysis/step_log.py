@@ -10,13 +10,28 @@ import pandas as pd
 from analysis.run_checks import read_table
 from analysis.runs import Run
 
+COLUMNS = (
+    "large_step_acceptance_rate",
+    "small_step_acceptance_rate",
+    "reuse_probability",
+    "loss_new",
+    "loss_existing",
+    "store_size",
+    "store_mean_age",
+)
+"""Of steps.csv, that tables and figures are made of."""
+
 
 def read_steps(run: Run) -> pd.DataFrame:
-    """A row per training step. Raises ValueError where steps.csv is missing or damaged."""
+    """A row per training step; NaN in columns of `COLUMNS` that the run did not log.
+
+    Raises ValueError where steps.csv is missing or damaged.
+    """
     try:
-        return read_table(run.folder / "steps.csv")
+        steps = read_table(run.folder / "steps.csv")
     except ValueError as error:
         raise ValueError(f"{run.folder}: {error}; move the run away") from error
+    return steps.reindex(columns=[*dict.fromkeys([*steps, *COLUMNS])])
 
 
 def mean_over_time(

@@ -8,7 +8,7 @@ variables v, then the two coordinates of the patch position (paper, Sec. 4 and 5
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Self
 
@@ -94,6 +94,31 @@ class BufferLayout:
         """The layout that carries these buffers too."""
         together = {*self.names, *names}
         return BufferLayout(tuple(name for name in _STORED if name in together))
+
+
+@dataclass(frozen=True)
+class MovingPoints:
+    """Where in the scene the K things are that variables move along; K may be 0.
+
+    A translation is affine in v, so that point k is at weight[k] v + offset[k], normalised by the
+    scene's box as the buffers' positions are.
+
+    weight: [K, 3, D] float32. offset: [K, 3] float32.
+    extent: [3] float32, the sides of the box relative to its longest one
+    """
+
+    weight: Tensor
+    offset: Tensor
+    extent: Tensor
+
+    @classmethod
+    def none(cls, dimensions: int) -> Self:
+        """Of a scene of D = `dimensions` variables in which nothing is moved along."""
+        return cls(torch.zeros(0, 3, dimensions), torch.zeros(0, 3), torch.ones(3))
+
+    def of(self, components: Sequence[int]) -> Self:
+        """For a v that holds only these components, all others of which move nothing."""
+        return replace(self, weight=self.weight[:, :, list(components)])
 
 
 @dataclass(frozen=True)

@@ -64,15 +64,12 @@ def build_network(config: DictConfig, *, samples: Samples) -> nn.Module:
 
     make = learn.seeded(instantiate(config.model), seed=config.seed)
     try:
-        network: nn.Module = make(
-            layout=samples.layout, scene_dimensions=samples.network_dimensions
-        )
+        return learn.network_of(samples, make)
     except TypeError as error:
         raise ValueError(
-            f"model: {error}; a network takes layout, scene_dimensions and the keys of model, "
-            "among them hidden_features and hidden_layers, which budgets set"
+            f"model: {error}; a network takes the keys of model, among them hidden_features and "
+            "hidden_layers, which budgets set"
         ) from error
-    return network
 
 
 def build_module(

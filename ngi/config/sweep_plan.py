@@ -6,7 +6,7 @@ import json
 import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -40,12 +40,14 @@ class Planned:
     done: part of its budget that is used up, 0 to 1
     left: seconds of training that are left, at most; None where nobody knows, and 0 where a run
         trains nothing
+    choices: words that not all runs of the sweep have in common; the folder's name may be cut
     """
 
     folder: Path
     state: str
     done: float
     left: float | None
+    choices: str = ""
 
     @property
     def runs(self) -> bool:
@@ -68,7 +70,10 @@ def planned_runs(config: DictConfig, loader: ConfigLoader) -> list[Planned]:
     (jobs,) = BasicSweeper.split_arguments(overrides, max_batch_size=None)
     costs: dict[str, float | None] = {}
     with tqdm(jobs, desc="plan", unit="run", leave=False, disable=None) as shown:
-        return [planned_run(loader.load_sweep_config(config, job), costs) for job in shown]
+        runs = [planned_run(loader.load_sweep_config(config, job), costs) for job in shown]
+    common = set.intersection(*map(set, jobs))
+    chosen = [" ".join(word for word in job if word not in common) for job in jobs]
+    return [replace(run, choices=words) for run, words in zip(runs, chosen, strict=True)]
 
 
 def planned_run(config: DictConfig, costs: dict[str, float | None]) -> Planned:
@@ -157,8 +162,11 @@ def _seconds_per_step(config: DictConfig) -> float | None:
 
 def table(runs: Sequence[Planned]) -> str:
     """A row per run, and what it comes to."""
-    rows = [[shown(run.folder), run.state, f"{run.done:.0%}", duration(run.left)] for run in runs]
-    headers = ["run", "state", "done", "training left"]
+    rows = [
+        [shown(run.folder), run.state, f"{run.done:.0%}", duration(run.left), run.choices]
+        for run in runs
+    ]
+    headers = ["run", "state", "done", "training left", "of this sweep's choices"]
     states = Counter(run.state.split(":")[0] for run in runs)
     total = [f"{count} {state}" for state, count in states.items()]
     to_do = [run for run in runs if run.runs]

@@ -23,7 +23,7 @@ from ngi.learn.lightning_trackers import MLflow, TensorBoard
 from ngi.learn.module import IlluminationModule, seeded
 from ngi.learn.recorder import Recorder
 from ngi.learn.run import Run
-from ngi.learn.samples import Example, PatchSamples, Samples, patch_example
+from ngi.learn.samples import Example, PatchSamples, Samples, network_of, patch_example
 from ngi.learn.schedule import ConstantRate, Schedule, WarmupStableDecay
 from ngi.learn.scorer import Scorer
 from ngi.learn.step import Learner, Step, training_step
@@ -77,6 +77,7 @@ __all__ = [
     "callbacks",
     "checkpoint_bytes",
     "components",
+    "network_of",
     "patch_example",
     "prepare_resume",
     "read_checkpoint",

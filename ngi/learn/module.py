@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from functools import wraps
 from inspect import signature
 from typing import Any, TypeVar
 
@@ -162,6 +163,7 @@ def seeded(make: Callable[..., T], *, seed: int) -> Callable[..., T]:
     PyTorch's initialisers know no other generator.
     """
 
+    @wraps(make)
     def seeded_make(**arguments: Any) -> T:
         with torch.random.fork_rng(devices=[]):  # weights are made on the CPU
             torch.default_generator.manual_seed(seed)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+import inspect
+from collections.abc import Callable
+from typing import Any, Protocol
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from ngi.denoise.denoised_job import DenoisedJob
 from ngi.denoise.denoisers import Denoiser
@@ -27,8 +29,12 @@ class Samples(Protocol):
     """Of the buffers."""
     dimensions: int
     """Of a sample's state, which stands where v does; the patch position is not counted."""
-    network_dimensions: int
-    """Of the vector that the network is given in v's place."""
+    network_arguments: dict[str, Any]
+    """What a network can ask for when it is made, by name, see `network_of`.
+
+    `layout`, `scene_dimensions`: the length of the vector that it is given in v's place, and of
+    patches `moving`: what moves, as a function of that vector.
+    """
     patch_size: int
 
     def check_resolution(self, resolution: int) -> None:
@@ -94,7 +100,11 @@ class PatchSamples:
         self.patch_size = renderer.patch_size
         left_out = slice(0, 0) if camera else renderer.camera_part
         self.components = [i for i in range(self.dimensions) if i not in _indices(left_out)]
-        self.network_dimensions = len(self.components)
+        self.network_arguments = {
+            "layout": self.layout,
+            "scene_dimensions": len(self.components),
+            "moving": renderer.moving_points.of(self.components),
+        }
 
     def check_resolution(self, resolution: int) -> None:
         """See `Samples.check_resolution`."""
@@ -131,9 +141,20 @@ class PatchSamples:
         return (self._of(scene_vector),)
 
     def _of(self, scene_vectors: Tensor) -> Tensor:
-        if self.network_dimensions == self.dimensions:
+        if len(self.components) == self.dimensions:
             return scene_vectors
         return scene_vectors[..., self.components]
+
+
+def network_of(samples: Samples, make: Callable[..., nn.Module]) -> nn.Module:
+    """A network for these samples.
+
+    make: its class or the like, its own sizes given; what it asks for of
+        `Samples.network_arguments` it gets
+    """
+    wanted = inspect.signature(make).parameters
+    given = samples.network_arguments
+    return make(**{name: value for name, value in given.items() if name in wanted})
 
 
 def patch_example(patches: Patches) -> Example:

@@ -10,7 +10,7 @@ from ngi.models.known_light import add_known_light
 from ngi.models.pixel_encoding import PixelEncoding
 from ngi.models.pixel_generator import CACHED_PIXELS, MANY_PIXELS, RADIANCE_CHANNELS
 from ngi.models.pixel_mlp import PixelMLP
-from ngi.patches import BufferLayout
+from ngi.patches import BufferLayout, MovingPoints
 
 
 class EncodedGenerator(nn.Module):
@@ -24,6 +24,8 @@ class EncodedGenerator(nn.Module):
     scene_dimensions: D, the length of v; may be 0
     hidden_features, hidden_layers: width of the hidden layers and their number
     octaves, directions: see `PixelEncoding`
+    relative: whether it is told where each pixel is relative to what moves
+    moving: what moves, as a function of the vector that it is given
 
     Under autocast everything between the encoding and the output is in the lower precision.
     """
@@ -37,12 +39,18 @@ class EncodedGenerator(nn.Module):
         hidden_layers: int,
         octaves: int,
         directions: bool,
+        relative: bool = False,
+        moving: MovingPoints | None = None,
     ) -> None:
         super().__init__()
         check_sizes(hidden_features=hidden_features, hidden_layers=hidden_layers)
         self.layout = layout
         self.scene_dimensions = scene_dimensions
-        self.encoding = PixelEncoding(layout=layout, octaves=octaves, directions=directions)
+        if not relative or moving is None:
+            moving = MovingPoints.none(scene_dimensions)
+        self.encoding = PixelEncoding(
+            layout=layout, octaves=octaves, directions=directions, moving=moving
+        )
         self.mlp = PixelMLP(
             pixel_features=self.encoding.features,
             patch_features=scene_dimensions,
@@ -85,5 +93,5 @@ class EncodedGenerator(nn.Module):
         if torch.is_autocast_enabled(device) and precision == torch.float32:
             precision = torch.get_autocast_dtype(device)
         with torch.autocast(device, enabled=False):
-            output: Tensor = self.mlp(self.encoding(pixels, precision), scene_vector)
+            output: Tensor = self.mlp(self.encoding(pixels, scene_vector, precision), scene_vector)
         return output.to(pixels.dtype)

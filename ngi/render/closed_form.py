@@ -9,7 +9,7 @@ from math import sqrt
 import torch
 from torch import Tensor
 
-from ngi.patches import BufferLayout
+from ngi.patches import BufferLayout, MovingPoints
 from ngi.render.protocol import Deferred, RenderedPatches
 from ngi.render.render_inputs import check_states, patch_window, require_positive
 from ngi.render.tracing import derive_seed
@@ -50,6 +50,7 @@ class ClosedFormRenderer(ABC):
             raise ValueError(f"renderer.noise is {noise}; expected a finite number from 0 up")
         self.layout = layout
         self.dimensions = dimensions
+        self.moving_points = MovingPoints.none(dimensions)
         self.patch_size = patch_size
         self.samples_per_pixel = samples_per_pixel
         self.noise = noise

@@ -24,6 +24,7 @@ from ngi.render.scalar_tracer import ScalarTracer
 from ngi.render.tracing import Pending, Tracer, derive_seed
 from ngi.scene import SceneDescription
 from ngi.scene.kinds import most_materials
+from ngi.scene.moving_points import moving_points
 from ngi.scene.variable_scene import VariableScene
 
 _logger = logging.getLogger(__name__)
@@ -97,6 +98,7 @@ class MitsubaRenderer:
         self.patch_size = patch_size
         self.samples_per_pixel = samples_per_pixel or scene.samples_per_pixel
         self._passes = passes(self.samples_per_pixel, patch_size**2)
+        self.moving_points = moving_points(self._scene)
         self.camera_part = scene.camera_part
         self.scene_hash = scene.scene_hash
         self.description = describe(self._variant)

@@ -8,7 +8,7 @@ from typing import Protocol
 
 from torch import Tensor
 
-from ngi.patches import BufferLayout
+from ngi.patches import BufferLayout, MovingPoints
 
 
 @dataclass(frozen=True)
@@ -70,6 +70,8 @@ class Renderer(Protocol):
     """spp of training patches."""
     buffer_samples: int
     """Rays per pixel of the buffers."""
+    moving_points: MovingPoints
+    """Where the things are that variables move along."""
     camera_part: slice
     """The components of v that place the camera; empty where none does."""
     scene_hash: str

@@ -71,6 +71,7 @@ class WorkerRenderer:
         self.patch_size = self._local.patch_size
         self.samples_per_pixel = self._local.samples_per_pixel
         self.buffer_samples = self._local.buffer_samples
+        self.moving_points = self._local.moving_points
         self.camera_part = self._local.camera_part
         self.scene_hash = self._local.scene_hash
         self._workers = workers

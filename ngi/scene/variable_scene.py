@@ -68,13 +68,17 @@ class VariableScene:
         """What a variable changes of the buffers, of all that its kind can change."""
         if isinstance(variable, DiscreteVariable):
             return variable.affects
-        owners = [self._parameters.object(name) for name in variable.objects]
+        owners = self.owners(variable)
         if not all(isinstance(owner, mi.Emitter) for owner in owners):
             return variable.affects
         never_seen = mi.EmitterFlags.Delta
         if all(mi.has_flag(owner.flags(), never_seen) for owner in owners):
             return frozenset()
         return variable.affects - {"position"}
+
+    def owners(self, variable: Variable) -> list[mi.Object]:
+        """Mitsuba's objects that a variable acts on."""
+        return [self._parameters.object(name) for name in variable.objects]
 
     def bsdfs(self) -> list[mi.BSDF]:
         """Every BSDF that a ray can hit at some v."""

@@ -115,6 +115,8 @@ def _remembered_place(folder: Path) -> dict[str, Any] | None:
         place: dict[str, Any] = json.loads(path.read_text())
         if place["_target_"] not in READERS:
             raise ValueError(f"_target_ is {place['_target_']!r}, known are {list(READERS)}")
+        if not isinstance(where := place.get("folder", place.get("path")), str):
+            raise TypeError(f"it names {where!r} where the scene's folder belongs")
     except (ValueError, KeyError, TypeError) as error:
         raise ValueError(f"{path} is damaged ({error}); delete it") from error
     return place

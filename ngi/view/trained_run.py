@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ from torch import Tensor, nn
 
 from ngi.evaluate import EvaluationProtocol
 from ngi.files.durable import DamagedError
-from ngi.learn import Samples, read_checkpoint
+from ngi.learn import Samples, network_of, read_checkpoint
 from ngi.render import Renderer
 from ngi.scene import SceneDescription
 from ngi.view.run_settings import (
@@ -71,11 +72,8 @@ class TrainedRun:
         description = describe_scene(folder, settings, scene_path)
         renderer = make_renderer(folder, settings, description)
         samples = make_samples(settings, renderer)
-        network = made_by(settings, "model")(
-            **plain(settings["model"]),
-            layout=samples.layout,
-            scene_dimensions=samples.network_dimensions,
-        )
+        make = partial(made_by(settings, "model"), **plain(settings["model"]))
+        network = network_of(samples, make)
         network.load_state_dict(trained_weights(checkpoint["state_dict"]))
         device = "cuda" if torch.cuda.is_available() else "cpu"
         return cls(

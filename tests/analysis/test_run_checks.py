@@ -1,6 +1,5 @@
 """Damage to a run's files: the run is left out by name, whatever else is there is reported."""
 
-import hashlib
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -9,27 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from analysis.exploration import exploration_numbers
 from analysis.report import main
 from analysis.runs import find_runs
-from tests.analysis.traces import write_steps, write_trace
-
-
-def write_logs(folder: Path) -> None:
-    """Logs of a run of ten steps, in the result file as training records them."""
-    position = np.random.default_rng(0).random((10, 4, 3))
-    target = np.ones((10, 4), np.float32)
-    write_trace(folder, position, np.ones((10, 4), bool), target_proposed=target)
-    write_steps(folder, 10)
-    file = folder / "result.json"
-    result = json.loads(file.read_text())
-    result["logs"] = {
-        name: {
-            "bytes": len(content := (folder / name).read_bytes()),
-            "sha256": hashlib.sha256(content).hexdigest(),
-        }
-        for name in ("metrics.csv", "steps.csv", "chains.bin")
-    }
-    file.write_text(json.dumps(result))
+from tests.analysis.traces import write_logs
 
 
 def cut_by_a_line(file: Path) -> None:
@@ -125,6 +107,20 @@ def of_before_checksums(folder: Path) -> None:
         (replace_in("result.json", '"index": 0', '"index": "a"'), "frames.0.index is 'a'"),
         (replace_in("result.json", '"floor": 0', '"floor": "x", "f": 0'), "floor is 'x', which"),
         (replace_in("result.json", '"logs": {', '"logs": {"a": 1, '), "result.json is incomplete"),
+        (
+            without_checksums(
+                "metrics.csv", lambda f: f.write_text(f"step,run_seconds\n1,2\n2,{10**400}\n")
+            ),
+            "metrics.csv, line 3: run_seconds is 1000",
+        ),
+        (replace_in("result.json", '"set"', '"sets"'), "no 'set'"),
+        (replace_in("result.json", '"seconds": {', '"minutes": {'), "no 'seconds'"),
+        (replace_in("result.json", '"patches_traced": ', '"patches_traced": "x", "p": '), "is 'x'"),
+        (replace_in("result.json", '"reuse": "self_tuning"', '"reuse": true'), "which is no text"),
+        (
+            replace_in("result.json", '"train": 120.0', '"train": 1' + 400 * "0"),
+            "seconds.train is '1000",
+        ),
     ],
 )
 def test_what_cannot_be_read_is_left_out_of_the_report(make_run, tmp_path, damage, reason) -> None:
@@ -145,6 +141,17 @@ def test_the_rest_is_reported(make_run, tmp_path, capsys) -> None:
     assert main([str(tmp_path / "runs")]) == 0
     assert f"left out: {folder}: steps.csv" in capsys.readouterr().err
     assert (tmp_path / "runs" / "report" / "index.html").exists()
+
+
+def test_columns_that_a_run_did_not_log_are_left_empty(make_run, tmp_path) -> None:
+    folder = make_run()
+    write_logs(folder)
+    without_checksums("steps.csv", lambda f: f.write_text("step,run_seconds\n1,2\n9,3\n"))(folder)
+    (run,) = find_runs(tmp_path)[0]
+    numbers = exploration_numbers(run)
+    assert numbers is not None
+    assert numbers["acceptance"] == 1
+    assert np.isnan([numbers["store_size"], numbers["reuse_probability"]]).all()
 
 
 def test_a_text_as_a_frame_s_error_is_named(make_run, tmp_path) -> None:

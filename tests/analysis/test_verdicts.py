@@ -27,6 +27,15 @@ def test_a_claim_needs_what_its_sweep_runs(claim) -> None:
     assert claim.command == f"python -m ngi.train -m +sweeps={claim.id} budget=small"
 
 
+def test_the_claim_on_anf_is_at_the_samples_that_anf_gets() -> None:
+    (claim,) = [claim for claim in CLAIMS if claim.id == "anf"]
+    method = yaml.safe_load((REPOSITORY / "conf" / "method" / "anf.yaml").read_text())
+    samples = f"{method['renderer']['samples_per_pixel']} samples per pixel"
+    assert samples in claim.title
+    assert samples in claim.statement
+    assert "at the same frame time" not in claim.statement
+
+
 def test_every_option_of_method_has_a_title() -> None:
     options = {file.stem for file in (REPOSITORY / "conf" / "method").glob("*.yaml")}
     assert options == set(TITLES)

@@ -1,5 +1,7 @@
-"""Writes chains.bin and target_map.bin as training does, with made-up numbers."""
+"""Writes a run's logs as training does, with made-up numbers."""
 
+import hashlib
+import json
 from pathlib import Path
 
 import numpy as np
@@ -54,3 +56,21 @@ def write_steps(folder: Path, count: int) -> None:
     lines = [",".join(["step", "run_seconds", *names, *rates])]
     lines += [f"{s},{2.0 * s},0.5,{1 / s},{2 / s},{16 * s},{s / 2},0.25," for s in range(1, count)]
     (folder / "steps.csv").write_text("\n".join(lines) + "\n")
+
+
+def write_logs(folder: Path) -> None:
+    """Logs of a run of ten steps, in the result file as training records them."""
+    position = np.random.default_rng(0).random((10, 4, 3))
+    target = np.ones((10, 4), np.float32)
+    write_trace(folder, position, np.ones((10, 4), bool), target_proposed=target)
+    write_steps(folder, 10)
+    file = folder / "result.json"
+    result = json.loads(file.read_text())
+    result["logs"] = {
+        name: {
+            "bytes": len(content := (folder / name).read_bytes()),
+            "sha256": hashlib.sha256(content).hexdigest(),
+        }
+        for name in ("metrics.csv", "steps.csv", "chains.bin")
+    }
+    file.write_text(json.dumps(result))

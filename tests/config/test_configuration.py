@@ -238,6 +238,7 @@ CHANGED = {
     "decay": "schedule",
     "averaging": "averaging",
     "encodings": "model",
+    "relative_positions": "model",
     "camera_left_out": "data",
     "denoised_targets": "data",
     "direct_light": "renderer",
@@ -253,11 +254,13 @@ CHANGED = {
 )
 def test_an_ablation_of_the_learner_changes_one_part(ablation: str, base: str) -> None:
     methods = composed("+sweeps=learner").hydra.sweeper.params.method.replace(" ", "").split(",")
-    assert {m.split("/")[1] for m in methods if m.startswith(ablation)} - {"tuned_adam"} == {
-        *CHANGED
-    }
+    parts = {m.split("/")[1] for m in methods if m.startswith(ablation)}
+    beside = {"ours_without": set(), "paper_with": {"tuned_adam"}}[ablation]
+    network = {"ours_without": set(), "paper_with": {"relative_positions"}}[ablation]  # only ours
+    assert parts == {*CHANGED} - network | beside
     whole = composed("budget=small", f"method={base}")
-    for part, group in CHANGED.items():
+    for part in parts - beside:
+        group = CHANGED[part]
         config = composed("budget=small", f"method={ablation}/{part}")
         assert [key for key in CHANGED.values() if config[key] != whole[key]] == [
             key for key in CHANGED.values() if key == group

@@ -11,7 +11,7 @@ import pytest
 
 from ngi.config.sweep import progress
 from ngi.config.sweep_plan import Planned, duration, table
-from tests.learn.command_line import SIZE, environment, run
+from tests.learn.command_line import SIZE, SMALL, environment, run
 
 PLACE = (
     "run.folder='outputs/steps/${optimizer.lr}-${seed}'"  # names of their own would be long and cut
@@ -28,7 +28,7 @@ def rows(output: str) -> dict[str, list[str]]:
     found = {}
     for line in output.splitlines():
         if match := re.match(r"outputs/steps/(\S+)\s+(.*)", line):
-            found[match[1]] = re.split(r"\s{2,}", match[2].strip())
+            found[match[1]] = re.split(r"\s{2,}", match[2].strip())[:3]
     return found
 
 
@@ -48,6 +48,9 @@ def test_before_it_starts_its_runs_are_listed(finished: tuple[Path, str]) -> Non
         name: ["new", "0%", "?"] for name in ("0.001-0", "-1-0", "0.001-1", "-1-1")
     }
     assert "4 runs: 4 new; how long they take is not known" in before
+    words = re.findall(r"0%\s+\?\s+(.*)", before)
+    expected = [f"optimizer.lr={lr} seed={seed}" for lr in ("0.001", "-1") for seed in (0, 1)]
+    assert sorted(words) == sorted(expected)
 
 
 def test_a_line_says_how_far_it_is_after_every_run(finished: tuple[Path, str]) -> None:
@@ -158,7 +161,7 @@ def test_a_bug_in_the_plan_of_a_dry_run_trains_nothing(
     tmp_path: Path, multirun: tuple[str, ...]
 ) -> None:
     ran = subprocess.run(
-        [sys.executable, "-c", BROKEN, *multirun, "--dry-run", *SIZE, "budget=steps", PLACE],
+        [sys.executable, "-c", BROKEN, *multirun, "--dry-run", *SMALL, PLACE],
         cwd=tmp_path,
         env=environment(tmp_path),
         capture_output=True,

@@ -1,4 +1,4 @@
-"""Looks for scene files that are read wrongly: `python -m tests.fuzz --inputs 10000`."""
+"""Looks for scenes and runs that are read wrongly: `python -m tests.fuzz --inputs 10000`."""
 
 from __future__ import annotations
 

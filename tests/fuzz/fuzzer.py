@@ -1,4 +1,4 @@
-"""Reads bad scene files and says where that goes wrong."""
+"""Reads bad scene files and damaged runs, and says where that goes wrong."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from random import Random
 from ngi.scene import SceneDescription, read_scene
 from ngi.scene.release import read_release
 from tests.fuzz.mutations import mutated
+from tests.fuzz.runs import RUN_FILES, damaged, read_damaged
 from tests.fuzz.seeds import RELEASES, SCENES, XML, write_seed
 
 LONGEST = 5.0
@@ -32,14 +33,18 @@ class Bug:
     @property
     def place(self) -> str:
         """The same for the same bug."""
-        lines = [line.strip() for line in self.what.splitlines() if "ngi/" in line]
-        return f"{self.kind}: {lines[-1] if lines else ''}: {self.what.splitlines()[-1][:150]}"
+        lines = self.what.splitlines()
+        ours = [line.strip() for line in lines if "ngi/" in line or "analysis/" in line]
+        return f"{self.kind}: {ours[-1] if ours else ''}: {lines[-1][:150]}"
 
 
 def make_input(number: int) -> tuple[str, bytes]:
-    """What file the input is, 'scene.yaml', 'scene.xml' or 'release', and its text."""
+    """What file the input is, 'scene.yaml', 'scene.xml', 'release', one of a run; and its text."""
     random = Random(number)
-    kind = random.choice(("scene.yaml", "scene.yaml", "scene.xml", "release", "release"))
+    kind = random.choice(("scene.yaml", "scene.yaml", "scene.xml", "release", "release", "run"))
+    if kind == "run":
+        kind = random.choice(RUN_FILES)
+        return kind, damaged(random, kind)
     seeds = {"scene.yaml": SCENES, "scene.xml": (XML.encode(),), "release": RELEASES}[kind]
     return kind, mutated(random, random.choice(seeds), xml=kind != "scene.yaml")
 
@@ -72,13 +77,13 @@ def read_one(
     longest: float = LONGEST,
 ) -> str | None:
     """What is wrong with how one input is read; None where it is read, or refused as it should."""
-    (folder / "scene.xml").write_text(XML)
-    (folder / "scene.yaml").write_bytes(SCENES[0])
-    (folder / ("scene.xml" if kind == "release" else kind)).write_bytes(text)
     try:
         with _at_most(longest), warnings.catch_warnings():
             warnings.simplefilter("error")
-            use(read_release(folder) if kind == "release" else read_scene(folder))
+            if kind in RUN_FILES:
+                read_damaged(folder, kind, text)
+            else:
+                use(_read_scene(folder, kind, text))
     except (ValueError, OSError) as error:
         if type(error) in (ValueError, FileNotFoundError) and str(folder) in str(error):
             return None if len(str(error)) < 20_000 else f"a message of {len(str(error))} letters"
@@ -86,6 +91,13 @@ def read_one(
     except BaseException:
         return traceback.format_exc()
     return None
+
+
+def _read_scene(folder: Path, kind: str, text: bytes) -> SceneDescription:
+    (folder / "scene.xml").write_text(XML)
+    (folder / "scene.yaml").write_bytes(SCENES[0])
+    (folder / ("scene.xml" if kind == "release" else kind)).write_bytes(text)
+    return read_release(folder) if kind == "release" else read_scene(folder)
 
 
 @contextmanager

@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 import logging
+import re
+from collections import Counter
+from contextlib import suppress
+from random import Random
+from xml.etree import ElementTree
 
 import pytest
 
@@ -11,7 +16,9 @@ from ngi.scene.loading import load
 from ngi.scene.release import read_release
 from ngi.scene.scene_files import read_scene_file
 from ngi.scene.variable_scene import VariableScene
-from tests.fuzz.fuzzer import fuzz, read_one
+from tests.fuzz.fuzzer import fuzz, make_input, read_one
+from tests.fuzz.mutations import mutated
+from tests.fuzz.runs import LOGS, RUN_FILES, good_files
 from tests.fuzz.seeds import RELEASES, SCENES, XML, write_seed
 
 
@@ -32,6 +39,30 @@ def test_seeds_are_good_scenes_of_the_authors(tmp_path, text) -> None:
     write_seed(tmp_path)
     (tmp_path / "scene.xml").write_bytes(text)
     assert read_release(tmp_path).dimensions > 1
+
+
+def test_damaged_runs_are_left_out_and_that_is_noticed(tmp_path, monkeypatch) -> None:
+    kinds = Counter(make_input(number)[0] for number in range(300))
+    assert {*RUN_FILES, "scene.yaml", "scene.xml", "release"} == {*kinds}
+    whole = good_files()
+    assert all(read_one(tmp_path, kind, whole[kind]) is None for kind in LOGS)
+    cut = whole["chains.bin"][:-1]
+    assert read_one(tmp_path, "chains.bin", cut) is None
+    monkeypatch.setattr("analysis.runs.check_logs", lambda *_: None)
+    assert "damage is not noticed" in str(read_one(tmp_path, "chains.bin", cut))
+
+
+def test_ranges_are_made_negative_and_tags_put_elsewhere() -> None:
+    made = [mutated(Random(number), RELEASES[0], xml=True) for number in range(200)]
+    assert any(re.search(rb'name="range_bounds" value="[^"]*-\d', text) for text in made)
+    assert any(re.search(rb'name="max_bounds"', text) for text in made)
+    assert any(_tag_in_a_film(text) for text in made)
+
+
+def _tag_in_a_film(text: bytes) -> bool:
+    with suppress(ElementTree.ParseError):
+        return ElementTree.fromstring(text).find(".//film/*[@name='range_bounds']") is not None
+    return False
 
 
 def test_bad_inputs_are_refused_with_a_message(tmp_path) -> None:

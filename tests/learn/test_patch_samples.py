@@ -2,10 +2,11 @@ from dataclasses import dataclass
 
 import pytest
 import torch
+from torch import nn
 
 from ngi.denoise import DenoisedJob
-from ngi.learn import PatchSamples
-from ngi.patches import BufferLayout
+from ngi.learn import PatchSamples, network_of, seeded
+from ngi.patches import BufferLayout, MovingPoints
 from ngi.render import AnalyticRenderer
 from ngi.render.protocol import Deferred
 
@@ -72,14 +73,37 @@ def test_what_only_places_the_camera_is_left_out() -> None:
     patches.scene_vector[1] = v
     (buffers, seen), _ = samples.example(patches)
     assert samples.dimensions == SCENE_VARIABLES + 2  # the sampler still draws all of them
-    assert samples.network_dimensions == SCENE_VARIABLES
+    assert samples.network_arguments["scene_dimensions"] == SCENE_VARIABLES
     assert torch.equal(seen[1], v[:SCENE_VARIABLES])
     assert torch.equal(samples.test_inputs(v, resolution=64)[0], v[:SCENE_VARIABLES])
     assert buffers is patches.buffers
 
 
+def test_a_network_gets_what_it_asks_for() -> None:
+    renderer = MovingCamera(patch_size=16)
+    renderer.moving_points = MovingPoints(
+        torch.rand(1, 3, renderer.dimensions), torch.rand(1, 3), torch.ones(3)
+    )
+    samples = PatchSamples(renderer=renderer, camera=False)
+    given = {}
+
+    def paper(*, layout, scene_dimensions) -> nn.Module:
+        given.update(layout=layout, scene_dimensions=scene_dimensions)
+        return nn.Identity()
+
+    def ours(*, layout, scene_dimensions, moving) -> nn.Module:
+        given["moving"] = moving
+        return paper(layout=layout, scene_dimensions=scene_dimensions)
+
+    network_of(samples, seeded(paper, seed=0))
+    assert given == {"layout": renderer.layout, "scene_dimensions": SCENE_VARIABLES}
+    network_of(samples, seeded(ours, seed=0))
+    expected = renderer.moving_points.weight[:, :, :SCENE_VARIABLES]
+    assert torch.equal(given["moving"].weight, expected)
+
+
 def test_the_paper_gives_all_of_v() -> None:
     samples = PatchSamples(renderer=MovingCamera(patch_size=16))
     v = torch.rand(SCENE_VARIABLES + 2)
-    assert samples.network_dimensions == SCENE_VARIABLES + 2
+    assert samples.network_arguments["scene_dimensions"] == SCENE_VARIABLES + 2
     assert torch.equal(samples.test_inputs(v, resolution=64)[0], v)

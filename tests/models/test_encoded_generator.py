@@ -5,9 +5,11 @@ import torch
 
 from ngi.models import EncodedGenerator
 from ngi.models.pixel_encoding import PixelEncoding
-from ngi.patches import BUFFER_CHANNELS, BufferLayout
+from ngi.patches import BUFFER_CHANNELS, BufferLayout, MovingPoints
 
 LAYOUT = BufferLayout()
+STILL = MovingPoints.none(4)
+V = torch.zeros(1, 4)
 
 
 def make_generator(**options) -> EncodedGenerator:
@@ -24,7 +26,7 @@ def make_buffers(*shape: int, layout: BufferLayout = LAYOUT) -> torch.Tensor:
 
 
 def test_the_encoding_is_what_its_formulas_say() -> None:
-    encoding = PixelEncoding(layout=LAYOUT, octaves=3, directions=True)
+    encoding = PixelEncoding(layout=LAYOUT, octaves=3, directions=True, moving=STILL)
     buffers = make_buffers(5)
     normal = torch.nn.functional.normalize(torch.randn(5, 3), dim=1)
     outgoing = torch.nn.functional.normalize(torch.randn(5, 3), dim=1)
@@ -42,7 +44,7 @@ def test_the_encoding_is_what_its_formulas_say() -> None:
         mirrored,
         (normal * outgoing).sum(dim=1, keepdim=True),
     ]
-    features = encoding(buffers, torch.float32)
+    features = encoding(buffers[None], V, torch.float32)[0]
     columns = torch.cat([part.float() for part in expected], dim=1)
     torch.testing.assert_close(features[:, : columns.shape[1]], columns, atol=2e-6, rtol=0)
     assert features.shape[1] == encoding.features
@@ -50,14 +52,55 @@ def test_the_encoding_is_what_its_formulas_say() -> None:
     assert (features[:, columns.shape[1] :] == 0).all()
 
 
+def test_offset_distance_direction_and_cosine_to_what_moves_are_told() -> None:
+    """Against the same in the units of a scene whose box is not a cube."""
+    low, sides = torch.tensor([-1.0, 0.5, 2.0]), torch.tensor([4.0, 1.0, 2.0])
+    start, step = torch.tensor([0.0, 1.0, 3.0]), torch.tensor([[2.0, 0, 0], [0.5, 0.25, 0]])
+    moving = MovingPoints(
+        weight=(step / sides).T[None], offset=((start - low) / sides)[None], extent=sides / 4
+    )
+    layout = BufferLayout(("position", "normal"))
+    sizes = {"layout": layout, "octaves": 0, "directions": False}
+    encoding = PixelEncoding(**sizes, moving=moving)  # type: ignore[arg-type]
+    buffers = make_buffers(2, 5, layout=layout)
+    v = torch.tensor([[0.5, 0.25], [1.0, 0.0]])
+    here = low + sides * buffers[..., :3]
+    away = (start + v @ step)[:, None] - here
+    distance = away.norm(dim=-1, keepdim=True)
+    normal = 2 * buffers[..., 3:] - 1
+    cosine = (away / distance * normal).sum(dim=-1, keepdim=True)
+    expected = torch.cat([away / 2, distance / 2, away / distance, cosine], dim=-1)
+    features = encoding(buffers, v, torch.float32)
+    torch.testing.assert_close(features[..., 6:14], expected, atol=1e-6, rtol=0)
+    buffers[0, 0, :3] = (start + v[0] @ step - low) / sides  # a pixel at the point itself
+    at_it = encoding(buffers, v, torch.float32)[0, 0, 6:14]
+    torch.testing.assert_close(at_it, torch.zeros(8), atol=1e-3, rtol=0)
+
+
+def test_what_moves_is_told_where_it_is_wanted() -> None:
+    moving = MovingPoints(torch.rand(2, 3, 4), torch.rand(2, 3), torch.ones(3))
+    without = make_generator()
+    assert make_generator(moving=moving).encoding.features == without.encoding.features
+    told = make_generator(moving=moving, relative=True)
+    assert told.encoding.features == without.encoding.features + 16
+    assert without.state_dict().keys() < told.state_dict().keys()
+    buffers = make_buffers(2, 8, 8)
+    v = torch.rand(2, 4)
+    restored = make_generator(moving=MovingPoints(*map(torch.zeros_like, vars(moving).values())),
+                              relative=True)  # fmt: skip
+    restored.load_state_dict(told.state_dict())
+    assert torch.equal(restored(buffers, v), told(buffers, v))
+
+
 def test_bfloat16_tells_neighbouring_positions_apart() -> None:
-    encoding = PixelEncoding(layout=LAYOUT, octaves=4, directions=False)
+    encoding = PixelEncoding(layout=LAYOUT, octaves=4, directions=False, moving=STILL)
     apart = make_buffers(100)
     apart[:, :3] = apart[:, :3] * 0.9
     beside = apart.clone()
     beside[:, :3] += 1 / 2000
     assert (apart[:, 0].bfloat16() == beside[:, 0].bfloat16()).sum() > 50
-    differ = (encoding(apart, torch.bfloat16) != encoding(beside, torch.bfloat16)).any(dim=1)
+    features = [encoding(pixels[None], V, torch.bfloat16) for pixels in (apart, beside)]
+    differ = (features[0] != features[1]).any(dim=2)
     assert differ.all()
 
 

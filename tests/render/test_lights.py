@@ -110,6 +110,15 @@ def test_the_camera_sees_the_width_of_its_field_of_view(load) -> None:
     assert renderer.camera_part == slice(0, 0), "where the camera is does not vary"
 
 
+@pytest.mark.parametrize("light", [POINT, SPOT])
+def test_the_renderer_tells_where_a_light_without_a_surface_is(load, light) -> None:
+    points = load(light, MOVES).moving_points
+    for v in (torch.zeros(3), torch.tensor([0.25, 0.5, 1.0])):
+        place = PLACE + [-1, -1, 0] + np.array([2, 2, 1]) * v.numpy()
+        ((*position,),) = (points.weight @ v + points.offset).tolist()
+        np.testing.assert_allclose((2 * np.array(position) - 1) * SIZE, place, atol=1e-5)
+
+
 def test_what_moves_a_light_changes_no_buffer(load) -> None:
     """They are rendered once."""
     renderer = load(SPOT, MOVES, AIMS)

@@ -70,6 +70,7 @@ def test_processes_give_the_same(two, here) -> None:
     )
     assert torch.equal(two.hard_frames(), here.hard_frames())
     assert (two.scene_hash, two.layout) == (here.scene_hash, here.layout)
+    assert torch.equal(two.moving_points.weight, here.moving_points.weight)
     assert two.description == f"{here.description}, workers: 2"
 
 

@@ -51,7 +51,13 @@ def test_where_the_scene_is_is_no_part_of_the_identity(tmp_path, monkeypatch) ->
     assert (folder / "settings.json").read_text() == identity
 
 
-@pytest.mark.parametrize("content", ["{", "[]", "{}", '{"_target_": "os.system"}'])
+READER = '"_target_": "ngi.scene.read_scene"'
+
+
+@pytest.mark.parametrize(
+    "content",
+    ["{", "[]", "{}", '{"_target_": "os.system"}', f"{{{READER}}}", f'{{{READER}, "folder": 3}}'],
+)
 def test_a_damaged_place_is_named(tmp_path, content: str) -> None:
     (tmp_path / "scene.json").write_text(content)
     with pytest.raises(ValueError, match=r"scene\.json is damaged.*delete it"):

@@ -46,7 +46,8 @@ class Sequences:
         self._target_renderings = target_renderings
         self._reach = reach
         self.layout = renderer.layout
-        self.dimensions = self.network_dimensions = 2 * renderer.dimensions
+        self.dimensions = 2 * renderer.dimensions
+        self.network_arguments = {"layout": self.layout, "scene_dimensions": self.dimensions}
         self.patch_size = renderer.patch_size
 
     def check_resolution(self, resolution: int) -> None:

@@ -38,7 +38,8 @@ class ObservationSets:
         self._part = renderer.camera_part
         self._shape = torch.Size([observations, self._part.stop - self._part.start])
         self.layout = renderer.layout
-        self.dimensions = self.network_dimensions = renderer.dimensions + self._shape.numel()
+        self.dimensions = renderer.dimensions + self._shape.numel()
+        self.network_arguments = {"layout": self.layout, "scene_dimensions": self.dimensions}
         self.patch_size = renderer.patch_size
 
     def check_resolution(self, resolution: int) -> None:

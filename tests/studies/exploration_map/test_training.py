@@ -46,6 +46,14 @@ def test_evaluations_are_spread_evenly_and_runs_repeat() -> None:
     assert first != [{**row, "seed": 0} for row in rows(method, seed=1)]
 
 
+def test_its_steps_are_guarded_as_those_of_every_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A gradient above the average is scaled down to it, where that is what the guard says."""
+    method = Method("uniform", reuse=False)
+    without = rows(method)
+    monkeypatch.setattr("ngi.learn.step_guard.OUTLIER", 1.0)
+    assert rows(method)[0]["error_uniform"] != without[0]["error_uniform"]
+
+
 def test_learning_lowers_the_error() -> None:
     plan = Plan(settings=(), steps=150, evaluations=10, frames=20)
     setting = Setting(volume=1e-3, dimensions=2, active=2, hidden_features=16)

@@ -1,0 +1,82 @@
+"""Where the things are that a scene's variables move along, as a function of v."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from ngi.machine.backend import mi
+from ngi.patches import MovingPoints
+from ngi.scene.kinds import Material, Translation
+from ngi.scene.variable import Variable
+from ngi.scene.variable_scene import VariableScene
+
+MOST = 4
+"""Points at most: a network is given eight numbers per pixel and point."""
+
+
+@dataclass(frozen=True)
+class _Moved:
+    """centre: [3] at some v. columns: [3, n], what each component of the variable adds to it."""
+
+    centre: NDArray[np.float64]
+    columns: NDArray[np.float64]
+    part: slice
+    emits: bool
+
+    @property
+    def rank(self) -> tuple[bool, float]:
+        """The smallest first: lights, then what moves farthest."""
+        return not self.emits, -float(np.linalg.norm(self.columns.sum(axis=1)))
+
+
+def moving_points(scene: VariableScene) -> MovingPoints:
+    """The centres of what translations move; of more than `MOST` the lights, then the farthest.
+
+    The objects of one variable are one thing, whose centre is that of the box around them. A
+    rotation or a scale about another point than this centre is left out of account. The scene is
+    left at some v.
+    """
+    description = scene.description
+    v = np.full(description.dimensions, 0.5)
+    for variable, part in description.parts():
+        if isinstance(variable, Material):  # moves nothing, and is slow to exchange
+            v[part] = 0
+    scene.apply(v)
+    moved = [
+        _moved(scene, variable, part)
+        for variable, part in description.parts()
+        if isinstance(variable, Translation) and part.stop > part.start and _seen(scene, variable)
+    ]
+    low, high = np.array(description.bounds)
+    sides = high - low
+    weight = np.zeros((min(MOST, len(moved)), 3, description.dimensions))
+    offset = np.zeros((len(weight), 3))
+    for k, point in enumerate(sorted(moved, key=lambda point: point.rank)[:MOST]):
+        weight[k, :, point.part] = point.columns / sides[:, None]
+        offset[k] = (point.centre - low) / sides - weight[k] @ v
+    tensors = (torch.from_numpy(array).float() for array in (weight, offset, sides / sides.max()))
+    return MovingPoints(*tensors)
+
+
+def _seen(scene: VariableScene, variable: Variable) -> bool:
+    """Whether a camera sees what it moves, or sees by its light."""
+    return all(isinstance(owner, mi.Shape | mi.Emitter) for owner in scene.owners(variable))
+
+
+def _moved(scene: VariableScene, variable: Variable, part: slice) -> _Moved:
+    box = mi.ScalarBoundingBox3f()
+    owners = scene.owners(variable)
+    for owner in owners:
+        box.expand(owner.bbox())
+    count = part.stop - part.start
+    start = variable.value(np.zeros(count))
+    columns = np.stack([variable.value(unit) - start for unit in np.eye(count)], axis=1)
+    emits = any(
+        isinstance(owner, mi.Emitter) or (isinstance(owner, mi.Shape) and owner.is_emitter())
+        for owner in owners
+    )
+    return _Moved(np.array(box.center()).ravel(), columns, part, emits)
