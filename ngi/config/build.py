@@ -68,7 +68,8 @@ def build_network(config: DictConfig, *, samples: Samples) -> nn.Module:
     except TypeError as error:
         raise ValueError(
             f"model: {error}; a network takes the keys of model, among them hidden_features and "
-            "hidden_layers, which budgets set"
+            "hidden_layers, which budgets set, and of layout, scene_dimensions and moving what it "
+            "asks for"
         ) from error
 
 
