@@ -19,8 +19,11 @@ def vertices(path: Path, kind: str) -> Values:
     with path.open("rb") as file:  # without a name: what the file refers to is not looked for
         try:
             mesh = trimesh.load_mesh(file, file_type=kind, process=False)
-            return np.array(mesh.vertices, dtype=np.float64).reshape(-1, 3)
+            found: Values = np.array(mesh.vertices, dtype=np.float64).reshape(-1, 3)
         except Exception as error:  # of nearly any class, as the file is damaged
             raise ValueError(
                 f"{path}: cannot be read as {kind.upper()}: {type(error).__name__}: {error}"
             ) from error
+    if not len(found):
+        raise ValueError(f"{path}: no face has a vertex")
+    return found
