@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from typing import Any, Protocol
 
 import torch
@@ -152,8 +152,11 @@ def network_of(samples: Samples, make: Callable[..., nn.Module]) -> nn.Module:
     make: its class or the like, its own sizes given; what it asks for of
         `Samples.network_arguments` it gets
     """
-    wanted = inspect.signature(make).parameters
     given = samples.network_arguments
+    try:
+        wanted: Container[str] = inspect.signature(make).parameters
+    except ValueError:  # its own arguments do not fit; the call says which
+        wanted = given
     return make(**{name: value for name, value in given.items() if name in wanted})
 
 
