@@ -51,5 +51,5 @@ def test_an_unknown_clock_is_refused() -> None:
 
 
 def test_the_model_clock_needs_costs() -> None:
-    with pytest.raises(ValueError, match=r"budget\.costs: null.*ngi\.costs"):
+    with pytest.raises(ValueError, match=r"budget\.costs: null.*ngi costs"):
         Budget(steps=1, clock="model")

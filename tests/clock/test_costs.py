@@ -170,7 +170,7 @@ def test_a_missing_component_is_named_with_the_remedy(tmp_path: Path) -> None:
     file = CostFile(tmp_path / "costs.json")
     file.add(component(), {"train": [1.0]}, measured_by={})
     rendering = Component("rendering", {"scene": {"name": "attic"}})
-    with pytest.raises(ValueError, match=r"costs\.json lacks 'rendering-.*attic.*ngi\.costs"):
+    with pytest.raises(ValueError, match=r"costs\.json lacks 'rendering-.*attic.*ngi costs"):
         file.costs([component(), rendering])
 
 

@@ -65,6 +65,7 @@ def test_a_checkpoint_waits_for_patches_unless_the_run_is_over(
     seen = []
     folder: Any = SimpleNamespace(
         path=tmp_path / "run",
+        name="run",
         checkpoint=tmp_path / "last.ckpt",
         stable_checkpoint=tmp_path / "stable.ckpt",
         logs=(),

@@ -48,7 +48,7 @@ def make_batch(network: EncodedGenerator, samples: int = 3) -> list[torch.Tensor
 
 def plain_output(network: EncodedGenerator, parameters, buffers, v) -> torch.Tensor:
     """One sample, [H, W, C] and [D] to [H, W, 3], by PyTorch's own layers."""
-    pixels = network.encoding(buffers, torch.float64)
+    pixels = network.encoding(buffers, v, torch.float64)
     inputs = torch.cat([pixels, v.expand(*pixels.shape[:-1], -1)], dim=-1)
     names = {name.removeprefix("mlp."): p for name, p in parameters.items()}
     first = torch.cat([names["weights.0"], names["patch_weight"]], dim=1)

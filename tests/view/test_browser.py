@@ -81,11 +81,18 @@ def viewer(folder: Path, port: int, run_folder: str = "run") -> Iterator[str]:
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[playwright.Browser]:
+def started() -> Iterator[playwright.Browser]:
     with playwright.sync_playwright() as tools:
         started = tools.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
         yield started
         started.close()
+
+
+@pytest.fixture
+def browser(started: playwright.Browser) -> Iterator[playwright.Browser]:
+    yield started
+    for context in started.contexts:  # a page that is left open goes on drawing
+        context.close()
 
 
 def opened(browser: playwright.Browser, address: str) -> playwright.Page:

@@ -50,7 +50,11 @@ class UNet(nn.Module):
 def halved(x: Tensor) -> Tensor:
     """[n, c, H, W] to half the size, the maximum of every 2 x 2 pixels; H and W are even.
 
-    `F.max_pool2d`, bit for bit, with a gradient that repeats on CUDA, where that one's does not.
+    `F.max_pool2d`, bit for bit and in the same order in memory, which decides how convolutions
+    round, with a gradient that repeats on CUDA, where that one's does not.
     """
     corners = [x[..., row::2, column::2] for row in (0, 1) for column in (0, 1)]
-    return torch.stack(corners).max(dim=0).values
+    largest = torch.stack(corners).max(dim=0).values
+    if x.is_contiguous(memory_format=torch.channels_last):
+        return largest.contiguous(memory_format=torch.channels_last)
+    return largest

@@ -181,16 +181,18 @@ def test_a_unet_keeps_any_size_and_sees_around_the_corner(size: tuple[int, int])
     assert x.grad[1:].abs().sum() == 0
 
 
-def test_pixels_are_halved_as_by_pytorch_bit_for_bit() -> None:
-    x = (4 * torch.rand(2, 3, 8, 6)).round()  # many of them are alike
+@pytest.mark.parametrize("order", [torch.contiguous_format, torch.channels_last])
+def test_pixels_are_halved_as_by_pytorch_bit_for_bit(order: torch.memory_format) -> None:
+    x = (4 * torch.rand(2, 3, 8, 6)).round().to(memory_format=order)  # many of them are alike
     pooled = []
     for pool in (halved, lambda image: F.max_pool2d(image, 2)):
         pixels = x.clone().requires_grad_()
         y = pool(pixels)
-        (y * torch.arange(y.numel()).view_as(y)).sum().backward()
+        (y * torch.arange(y.numel()).view(y.shape)).sum().backward()
         assert pixels.grad is not None
         pooled.append((y, pixels.grad))
     assert all(torch.equal(a, b) for a, b in zip(*pooled, strict=True))
+    assert pooled[0][0].stride() == pooled[1][0].stride()
 
 
 def test_it_learns_one_scene_by_heart() -> None:
