@@ -3,19 +3,17 @@
 import numpy as np
 import pytest
 import torch
-from PIL import Image
 
 from ngi.machine.backend import activate, llvm_problem, mi
 from ngi.render.mitsuba_renderer import MitsubaRenderer
 from ngi.scene import read_scene
 from ngi.scene.jit_variables import address, aligned
-from ngi.studies.benchmark.measure import counted_compilations, counted_kernels
+from ngi.studies.benchmark.measure import counted_compilations
 from tests.scene import (
     test_updates_of_appearance,
     test_updates_of_light_and_view,
     test_updates_of_objects,
 )
-from tests.scene.release_files import read, tags
 from tests.scene.updates import check_update, scene_of, together
 
 pytestmark = pytest.mark.skipif(llvm_problem() is not None, reason=str(llvm_problem()))
@@ -115,29 +113,6 @@ def test_nothing_is_compiled_and_nothing_is_stale(update, make_scene) -> None:
         assert torch.equal(anew.log_radiance[0], patches.log_radiance[i])
         assert torch.equal(anew.buffers[0], patches.buffers[i])
         assert not torch.equal(anew.log_radiance[0], patches.log_radiance[i - 1])
-
-
-def test_a_tinted_bitmap_is_recorded_once(tmp_path) -> None:
-    for name in "ab":
-        pixels = np.random.default_rng(ord(name)).integers(0, 255, (16, 16, 3), dtype=np.uint8)
-        Image.fromarray(pixels).save(tmp_path / f"{name}.png")
-    page = (
-        '<shape type="rectangle"><bsdf type="diffuse" id="var_{0}">{1}<texture type="bitmap" '
-        'name="reflectance"><string name="filename" value="{0}.png"/></texture></bsdf></shape>'
-    )
-    lamp = '<emitter type="point"><point name="position" x="0" y="2" z="4"/></emitter>'
-    body = "".join(page.format(name, tags(3, "0, 0, 0", "1, 1, 1")) for name in "ab")
-    renderer = MitsubaRenderer(
-        scene=read(tmp_path, body + lamp), backend="llvm", patch_size=8, samples_per_pixel=2
-    )
-    renderer.warm_up()
-    states = torch.rand(12, 8, generator=torch.Generator().manual_seed(0))
-    states[6:, 1:3] = states[5, 1:3]  # of one bitmap only, then
-    with counted_kernels() as before:  # counting is a setting of its own, for which Dr.Jit records
-        renderer.render_patches(states, resolution=16, seed=1)
-    with counted_kernels() as kernels:
-        renderer.render_patches(states.flip(0), resolution=16, seed=1)
-    assert (before.compiled, kernels.compiled, kernels.recorded) == (0, 0, 0)
 
 
 @pytest.mark.parametrize("kind", [np.uint8, np.float32])
