@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ngi.scene.kinds import CameraPath, FieldOfView, LookAt
+from ngi.scene.kinds import CameraPath, FieldOfView, LookAt, Material
 from ngi.scene.scene_files import SceneFile
 from ngi.scene.transforms import Matrix, look_at
 from ngi.scene.variable import Variable
@@ -65,6 +65,14 @@ class SceneDescription:
             count = len(variable.components)
             yield variable, slice(start, start + count)
             start += count
+
+    def with_first_materials(self, v: NDArray[np.float64]) -> NDArray[np.float64]:
+        """v [D] with no material exchanged, which is slow and moves nothing."""
+        changed = v.copy()
+        for variable, part in self.parts():
+            if isinstance(variable, Material):
+                changed[part] = 0
+        return changed
 
     @property
     def camera_part(self) -> slice:

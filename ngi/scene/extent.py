@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ngi.scene.description import SceneDescription
-from ngi.scene.kinds import LookAt, Material
+from ngi.scene.kinds import LookAt
 from ngi.scene.scene_parameters import has_surface
 from ngi.scene.variable_scene import VariableScene
 
@@ -71,7 +71,4 @@ def _configurations(description: SceneDescription) -> Iterator[np.ndarray]:
     for index in range(CONFIGURATIONS):
         v = generator.random(description.dimensions)
         v = np.full_like(v, index) if index < 2 else v
-        for variable, part in description.parts():
-            if isinstance(variable, Material):  # moves nothing, and is slow to exchange
-                v[part] = 0
-        yield v
+        yield description.with_first_materials(v)

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from ngi.machine.backend import mi
 from ngi.patches import MovingPoints
-from ngi.scene.kinds import Material, Translation
+from ngi.scene.kinds import Translation
+from ngi.scene.scene_parameters import emits
 from ngi.scene.variable import Variable
 from ngi.scene.variable_scene import VariableScene
 
@@ -41,10 +42,7 @@ def moving_points(scene: VariableScene) -> MovingPoints:
     left at some v.
     """
     description = scene.description
-    v = np.full(description.dimensions, 0.5)
-    for variable, part in description.parts():
-        if isinstance(variable, Material):  # moves nothing, and is slow to exchange
-            v[part] = 0
+    v = description.with_first_materials(np.full(description.dimensions, 0.5))
     scene.apply(v)
     moved = [
         _moved(scene, variable, part)
@@ -75,8 +73,4 @@ def _moved(scene: VariableScene, variable: Variable, part: slice) -> _Moved:
     count = part.stop - part.start
     start = variable.value(np.zeros(count))
     columns = np.stack([variable.value(unit) - start for unit in np.eye(count)], axis=1)
-    emits = any(
-        isinstance(owner, mi.Emitter) or (isinstance(owner, mi.Shape) and owner.is_emitter())
-        for owner in owners
-    )
-    return _Moved(np.array(box.center()).ravel(), columns, part, emits)
+    return _Moved(np.array(box.center()).ravel(), columns, part, any(map(emits, owners)))

@@ -19,6 +19,11 @@ def has_surface(shape: mi.Shape) -> bool:
     return not shape.class_name().startswith(("Instance", "ShapeGroup"))
 
 
+def emits(owner: mi.Object) -> bool:
+    """Whether it is an emitter, or a shape that carries one."""
+    return isinstance(owner, mi.Emitter) or (isinstance(owner, mi.Shape) and owner.is_emitter())
+
+
 class SceneParameters(Parameters):
     """The `ngi.scene.variable.LoadedScene` of a Mitsuba scene; needs its variant to be active.
 
@@ -43,11 +48,8 @@ class SceneParameters(Parameters):
                 f"{self._file}: '{object_id}' is a {owner.class_name()}; name one of {list(only)}"
             )
         if object_id not in self._placements:
-            emits = isinstance(owner, mi.Emitter) or (
-                isinstance(owner, mi.Shape) and owner.is_emitter()
-            )
             self._placements[object_id] = Placement(
-                self._body(object_id, owner), parking=None if emits else parking(self._size)
+                self._body(object_id, owner), parking=None if emits(owner) else parking(self._size)
             )
         return self._placements[object_id]
 
