@@ -67,7 +67,7 @@ class SceneDescription:
             start += count
 
     def with_first_materials(self, v: NDArray[np.float64]) -> NDArray[np.float64]:
-        """v [D] with no material exchanged, which is slow and moves nothing."""
+        """The same v [D] with no material exchanged, which is slow and moves nothing."""
         changed = v.copy()
         for variable, part in self.parts():
             if isinstance(variable, Material):
