@@ -174,7 +174,8 @@ def _evenly(found: Sequence[Window]) -> list[Window]:
 
 
 def _relative(weights: np.ndarray) -> np.ndarray:
-    return weights / weights.mean()
+    relative: np.ndarray = weights / weights.mean()
+    return relative
 
 
 def _distances(runs: Sequence[Run], styles: Styles) -> Figure:

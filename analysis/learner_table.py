@@ -2,19 +2,23 @@
 
 `python -m analysis.learner_table` writes them between markers of README.md and of
 docs/learner/README.md, from docs/learner/results.csv and ablation.csv. Both files are those of a
-report (`ngi report`), the latter on runs of `sweeps/learner`.
+report (`ngi report`), the latter on runs of `sweeps/learner`. What frames take comes from
+docs/learner/frames.json, which `ngi benchmark frames` writes.
 """
 
 from __future__ import annotations
 
+import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from analysis.readme_table import between_markers
+from analysis.parts_of_frames import frames_table
+from analysis.readme_table import between_markers, markdown_row
 from analysis.runs import METRICS
 
 RESULTS = Path("docs/learner/results.csv")
@@ -22,6 +26,8 @@ BEGIN, END = "<!-- learner: written by analysis.learner_table -->", "<!-- end of
 
 ABLATION = Path("docs/learner/ablation.csv")
 OF_PARTS = ("<!-- parts: written by analysis.learner_table -->", "<!-- end of parts -->")
+FRAMES = Path("docs/learner/frames.json")
+OF_FRAMES = ("<!-- frames: written by analysis.learner_table -->", "<!-- end of frames -->")
 OURS, PAPER = "ours", "active_exploration"
 
 METHODS = {
@@ -45,7 +51,7 @@ def learner_table(results: pd.DataFrame, metrics: Sequence[str], methods: Sequen
     results: the report's table of results; only scenes that have every method are shown
     """
     heads = ["scene", "seeds", *(METHODS[method] for method in methods)]
-    lines = [_row(heads), _row([":--", "--:", *[":--"] * len(methods)])]
+    lines = [markdown_row(heads), markdown_row([":--", "--:", *[":--"] * len(methods)])]
     rows = results.set_index(["scene", "method"])
     for scene in sorted(set(results["scene"])):
         if any((scene, method) not in rows.index for method in methods):
@@ -56,7 +62,7 @@ def learner_table(results: pd.DataFrame, metrics: Sequence[str], methods: Sequen
         shown = errors.map(lambda value: f"{value:.3f}")
         shown = shown.where(errors.ne(errors.min(axis=1), axis=0), "**" + shown + "**")
         seeds = len(str(rows.loc[(scene, methods[0]), "seeds"]).split())
-        lines.append(_row([scene, str(seeds), *(" / ".join(shown[m]) for m in methods)]))
+        lines.append(markdown_row([scene, str(seeds), *(" / ".join(shown[m]) for m in methods)]))
     return "\n".join(lines)
 
 
@@ -70,14 +76,14 @@ def parts_table(results: pd.DataFrame) -> str:
     error = np.exp(np.log(results[[f"hard_{metric}" for metric in METRICS]]).mean(axis=1))
     error.index = pd.MultiIndex.from_frame(results[["scene", "method"]])
     heads = ("scene", "part", "ours without it", "", "the paper's method with it", "")
-    lines = [_row(heads), _row([":--", ":--", "--:", "--:", "--:", "--:"])]
+    lines = [markdown_row(heads), markdown_row([":--", ":--", "--:", "--:", "--:", "--:"])]
     for scene in sorted(set(results["scene"])):
         parts = dict.fromkeys(m.split("/")[1] for m in error[scene].index if "/" in m)
         if not (parts and {OURS, PAPER} <= set(error[scene].index)):
             continue
         wholes = {"ours_without": error[scene, OURS], "paper_with": error[scene, PAPER]}
         shown = [f"**{wholes['ours_without']:.4f}**", "", f"**{wholes['paper_with']:.4f}**", ""]
-        lines.append(_row([scene, "*the whole method*", *shown]))
+        lines.append(markdown_row([scene, "*the whole method*", *shown]))
         for part in parts:
             cells = []
             for ablation, whole in wholes.items():
@@ -85,12 +91,8 @@ def parts_table(results: pd.DataFrame) -> str:
                 cells += (
                     ["", ""] if found is None else [f"{found:.4f}", f"{found / whole - 1:+.0%}"]
                 )
-            lines.append(_row([scene, part.replace("_", " "), *cells]))
+            lines.append(markdown_row([scene, part.replace("_", " "), *cells]))
     return "\n".join(lines)
-
-
-def _row(cells: Sequence[str]) -> str:
-    return f"| {' | '.join(cells)} |"
 
 
 def written(page: str, results: pd.DataFrame, of: Path) -> str:
@@ -106,6 +108,12 @@ def with_parts(page: str, results: pd.DataFrame) -> str:
     return between_markers(page, parts_table(results), begin=begin, end=end)
 
 
+def with_frames(page: str, benchmark: Mapping[str, Any]) -> str:
+    """The page with its table of frames. Raises ValueError where its markers are missing."""
+    begin, end = OF_FRAMES
+    return between_markers(page, frames_table(benchmark["figures"]), begin=begin, end=end)
+
+
 def main() -> int:
     """Entry point; returns the exit status."""
     try:
@@ -113,7 +121,8 @@ def main() -> int:
         for page in PAGES:
             page.write_text(written(page.read_text(), results, page))
         page = Path("docs/learner/README.md")
-        page.write_text(with_parts(page.read_text(), pd.read_csv(ABLATION)))
+        text = with_parts(page.read_text(), pd.read_csv(ABLATION))
+        page.write_text(with_frames(text, json.loads(FRAMES.read_text())))
     except (OSError, ValueError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 1

@@ -141,23 +141,29 @@ def _row(frame: FrameOfMethods) -> Image.Image:
         error = _enlarged(run, frame.index, "error")
         panels.append((f"its error, MAPE {frame.mape(method):.3f}", error))
     width, height = panels[0][1].size
-    row = Image.new(
-        "RGB", (_MARGIN + (width + _MARGIN) * len(panels), _MARGIN + _LINE + height), "white"
-    )
+    labels = [_lines(label, width) for label, _ in panels]
+    top = _MARGIN + _LINE * max(len(lines) for lines in labels)
+    row = Image.new("RGB", (_MARGIN + (width + _MARGIN) * len(panels), top + height), "white")
     draw = ImageDraw.Draw(row)
-    for column, (label, image) in enumerate(panels):
+    for column, (lines, (_, image)) in enumerate(zip(labels, panels, strict=True)):
         left = _MARGIN + column * (width + _MARGIN)
-        draw.text((left, _MARGIN), _fitted(label, width), fill="black", font=_font(14))
-        row.paste(image, (left, _MARGIN + _LINE))
+        for number, line in enumerate(lines):
+            draw.text((left, _MARGIN + _LINE * number), line, fill="black", font=_font(14))
+        row.paste(image, (left, top))
     return row
 
 
-def _fitted(label: str, width: int) -> str:
-    """The label, cut with an ellipsis where it is wider than its picture."""
-    font = _font(14)
-    while len(label) > 1 and font.getlength(label) > width:
-        label = label.removesuffix("…")[:-1] + "…"
-    return label
+def _lines(label: str, width: int) -> list[str]:
+    """The label in lines no wider than its picture, but for single words that are."""
+    first, *words = label.split()
+    lines = [first]
+    for word in words:
+        longer = f"{lines[-1]} {word}"
+        if _font(14).getlength(longer) <= width:
+            lines[-1] = longer
+        else:
+            lines.append(word)
+    return lines
 
 
 def _enlarged(run: Run, index: int, kind: str) -> Image.Image:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from analysis.claims import CLAIMS
@@ -43,8 +43,13 @@ def readme_table(results: str) -> str:
             continue
         shown = verdict if verdict == Verdict.INCONCLUSIVE else f"**{verdict}**"
         cells = (titles[line["claim"]], line["compared"], line["difference"], shown)
-        rows.append(f"| {' | '.join(cells)} |")
+        rows.append(markdown_row(cells))
     return "\n".join(rows)
+
+
+def markdown_row(cells: Iterable[str]) -> str:
+    """A line of a table in Markdown."""
+    return f"| {' | '.join(cells)} |"
 
 
 def with_table(page: str, table: str) -> str:

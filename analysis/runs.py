@@ -45,11 +45,13 @@ class Run:
 
     @property
     def label(self) -> dict[str, str]:
-        return self.result["label"]
+        label: dict[str, str] = self.result["label"]
+        return label
 
     @property
     def seed(self) -> int:
-        return self.result["seed"]
+        seed: int = self.result["seed"]
+        return seed
 
     @property
     def versions(self) -> list[dict[str, Any]]:
@@ -196,7 +198,8 @@ def comparison_warnings(runs: Sequence[Run]) -> list[str]:
 
 def _clock(run: Run) -> str:
     """'wall', or 'model' where run time was counted with measured costs per step."""
-    return run.result.get("clock", "wall")
+    clock: str = run.result.get("clock", "wall")
+    return clock
 
 
 def _commits(run: Run) -> str:

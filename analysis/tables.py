@@ -67,7 +67,7 @@ def comparison_table(comparisons: Sequence[Comparison], sets: Sequence[str] = SE
         (
             Cell(comparison.scene),
             Cell(f"{method_title(comparison.other)} / {method_title(comparison.baseline)}"),
-            *(Cell(_percent_or_missing(comparison.differences[key])) for key in keys),
+            *(Cell(format_percent(comparison.differences[key])) for key in keys),
         )
         for comparison in comparisons
     )
@@ -132,7 +132,7 @@ def format_estimate(value: Estimate) -> str:
     return f"{format_number(value.mean)} ± {format_number(value.half_width, decimals)}"
 
 
-def _percent_or_missing(value: Estimate | None) -> str:
+def format_percent(value: Estimate | None) -> str:
     """'-12.3 ± 4.5 %'; missing too where it is undefined, for a baseline of 0."""
     if value is None or math.isnan(value.mean):
         return MISSING
@@ -165,4 +165,5 @@ def to_markdown(table: Table) -> str:
 
 def _grid(table: Table, rows: list[list[str]], style: str) -> str:
     alignment = ["left"] * table.labels + ["right"] * (len(table.columns) - table.labels)
-    return tabulate(rows, table.columns, style, colalign=alignment, disable_numparse=True)
+    grid: str = tabulate(rows, table.columns, style, colalign=alignment, disable_numparse=True)
+    return grid

@@ -98,12 +98,14 @@ def _density(record: np.void, plane: str, cells: int) -> np.ndarray:
     """[cells, cells] mean target density of the map's patches in each cell, summing up to 1."""
     states, target = _coordinates(record["state"], plane), record["target"].ravel()
     mean = _histogram(states, cells, target) / np.maximum(_histogram(states, cells), 1)
-    return mean / mean.sum()
+    density: np.ndarray = mean / mean.sum()
+    return density
 
 
 def _histogram(states: np.ndarray, cells: int, weights: np.ndarray | None = None) -> np.ndarray:
     edges = [np.linspace(0, 1, cells + 1)] * 2
-    return np.histogram2d(states[:, 0], states[:, 1], bins=edges, weights=weights)[0]
+    counts: np.ndarray = np.histogram2d(states[:, 0], states[:, 1], bins=edges, weights=weights)[0]
+    return counts
 
 
 def histogram_distances(runs: Sequence[Run], plane: str = "scene") -> pd.DataFrame:

@@ -121,6 +121,20 @@ class MovingPoints:
         return replace(self, weight=self.weight[:, :, list(components)])
 
 
+COMPUTED_WITH = ("scene_vector", "buffers", "log_radiance")
+"""The fields of `Patches` that networks compute with."""
+
+
+def uploaded(tensor: Tensor, device: torch.device | str) -> Tensor:
+    """The tensor on this device. Where that is a GPU, the host does not wait for it.
+
+    A copy from memory that the system may move would be waited for, with all that is queued.
+    """
+    if tensor.device.type == "cpu" and torch.device(device).type == "cuda":
+        return tensor.pin_memory().to(device, non_blocking=True)
+    return tensor.to(device)
+
+
 @dataclass(frozen=True)
 class Patches:
     """n rendered patches of P x P pixels.
@@ -147,7 +161,9 @@ class Patches:
         return replace(self, **{f.name: getattr(self, f.name)[index] for f in fields(self)})
 
     def to(self, device: torch.device | str) -> Self:
-        return replace(self, **{f.name: getattr(self, f.name).to(device) for f in fields(self)})
+        """What networks compute with, on this device; what only the host looks at stays."""
+        moved = {name: uploaded(getattr(self, name), device) for name in COMPUTED_WITH}
+        return replace(self, **moved)
 
     @classmethod
     def blank(cls, count: int, *, layout: BufferLayout, dimensions: int, patch_size: int) -> Self:

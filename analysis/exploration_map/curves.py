@@ -20,6 +20,7 @@ from analysis.exploration_map.runs import (
     SAMPLERS,
     UNIFORM,
     at_base,
+    samplers_of,
     scoring_cost,
 )
 from analysis.exploration_map.speedup import Comparison
@@ -76,7 +77,7 @@ def _knobs(speedups: pd.DataFrame) -> Figure:
 def _knob_panel(axes: Axes, speedups: pd.DataFrame, knob: str) -> None:
     values = sorted(speedups[knob].unique())
     places = {value: place for place, value in enumerate(values)}
-    for index, (sampler, name) in enumerate(SAMPLERS.items()):
+    for index, (sampler, name) in enumerate(samplers_of(speedups).items()):
         line = speedups[speedups["sampler"] == sampler].sort_values(knob)
         x = line[knob].map(places) + 0.05 * (index - 2.5)
         below, above = line["speedup"] - line["low"], line["high"] - line["speedup"]
@@ -115,7 +116,8 @@ def _errors(table: pd.DataFrame, error: str) -> Figure:
 
 
 def _error_panel(axes: Axes, rows: pd.DataFrame, reuse: bool, error: str) -> None:
-    for sampler, style in _styles().items():
+    styles = _styles()
+    for sampler in (UNIFORM, *samplers_of(rows)):
         comparison = Comparison(rows, sampler, reuse, BASE["cost_ratio"], error)
         curves = comparison.curves(sampler, scoring=scoring_cost(sampler))
         axes.plot(
@@ -123,6 +125,6 @@ def _error_panel(axes: Axes, rows: pd.DataFrame, reuse: bool, error: str) -> Non
             curves.errors.mean(axis=0),
             label=SAMPLERS.get(sampler, sampler),
             linewidth=1.2,
-            **style,
+            **styles[sampler],
         )
     axes.set_ylim(bottom=0)

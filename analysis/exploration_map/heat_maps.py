@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 
-from analysis.exploration_map.runs import ERRORS, KNOBS, SAMPLERS, at_base
+from analysis.exploration_map.runs import ERRORS, KNOBS, at_base, samplers_of
 from analysis.plots import STYLE, new_figure, save_figure
 
 PAIRS = (("dimensions", "volume"), ("noise", "volume"), ("cost_ratio", "volume"))
@@ -56,11 +56,12 @@ def cell_text(cell: Mapping[Hashable, Any]) -> str:
 
 
 def _figure(speedups: pd.DataFrame, columns: str, rows: str) -> Figure:
+    samplers = samplers_of(speedups)
     cells = speedups[columns].nunique(), speedups[rows].nunique()
-    figure = new_figure(0.55 * cells[0] * len(SAMPLERS) + 2.2, 0.42 * cells[1] * len(REUSE) + 2.2)
-    panels = figure.subplots(len(REUSE), len(SAMPLERS), squeeze=False, sharex=True, sharey=True)
+    figure = new_figure(0.55 * cells[0] * len(samplers) + 2.2, 0.42 * cells[1] * len(REUSE) + 2.2)
+    panels = figure.subplots(len(REUSE), len(samplers), squeeze=False, sharex=True, sharey=True)
     for panel_row, (reuse, reuse_name) in zip(panels, REUSE.items(), strict=True):
-        for axes, (sampler, name) in zip(panel_row, SAMPLERS.items(), strict=True):
+        for axes, (sampler, name) in zip(panel_row, samplers.items(), strict=True):
             of_method = speedups[(speedups["sampler"] == sampler) & (speedups["reuse"] == reuse)]
             image = _panel(axes, of_method, columns, rows)
             axes.set_title(name.replace(", ", ",\n") if reuse is False else "", fontsize=7)

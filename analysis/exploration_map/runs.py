@@ -43,20 +43,24 @@ SETTING = [knob for knob in KNOBS if knob != "cost_ratio"]
 UNIFORM = "uniform"
 
 SAMPLERS = {
-    f"{target}_{rule}": f"{name}, {rule.capitalize() if rule == 'metropolis' else rule}"
-    for target, name in (
-        ("loss", "loss"),
-        ("loss_step", "loss × step"),
-        ("output_gradient", "loss × output gradient"),
-    )
-    for rule in ("greedy", "metropolis")
+    **{
+        f"{target}_{rule}": f"{name}, {rule.capitalize() if rule == 'metropolis' else rule}"
+        for target, name in (
+            ("loss", "loss"),
+            ("loss_step", "loss × step"),
+            ("output_gradient", "loss × output gradient"),
+        )
+        for rule in ("greedy", "metropolis")
+    },
+    "predicted": "predicted loss",
 }
 """Every sampler that explores, and its name."""
 
-SCORING = {"loss": 0.35, "output_gradient": 0.4, "loss_step": 1.4}
+SCORING = {"loss": 0.35, "output_gradient": 0.4, "loss_step": 1.4, "predicted": 1.2}
 """What scoring 16 proposals and 16 current states costs, in training steps of 8 x 512 in bf16.
 
-Measured on two cores (docs/explanation/speed.md; loss alone by the same benchmark).
+Measured on two cores (docs/explanation/speed.md; loss alone by the same benchmark). Predicting the
+losses of a batch's candidates takes up to 42 ms (docs/exploration-ceiling), in steps of ours.
 """
 
 COST_RATIOS = (0.01, 0.1, 1.0, 10.0, 100.0)
@@ -86,7 +90,15 @@ def read_table(folder: Path) -> pd.DataFrame:
 
 def scoring_cost(sampler: str) -> float:
     """Of one batch, in training steps; nothing for the uniform sampler."""
-    return 0.0 if sampler == UNIFORM else SCORING[sampler.rsplit("_", 1)[0]]
+    if sampler == UNIFORM:
+        return 0.0
+    return SCORING[sampler if sampler in SCORING else sampler.rsplit("_", 1)[0]]
+
+
+def samplers_of(table: pd.DataFrame) -> dict[str, str]:
+    """Those of `SAMPLERS` that a table has rows of, in their order."""
+    there = set(table["sampler"])
+    return {sampler: name for sampler, name in SAMPLERS.items() if sampler in there}
 
 
 def run_time(rows: pd.DataFrame, *, cost_ratio: float, scoring: float) -> pd.Series:

@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 
 from analysis.exploration_map.heat_maps import REUSE, cell_text
-from analysis.exploration_map.runs import BASE, COST_RATIOS, ERRORS, SAMPLERS, SETTING
+from analysis.exploration_map.runs import BASE, COST_RATIOS, ERRORS, SETTING, samplers_of
 from analysis.exploration_map.speedup import Comparison
 from analysis.tables import Cell, Table
 
@@ -23,8 +23,10 @@ def speedups(table: pd.DataFrame) -> pd.DataFrame:
     """
     rows = []
     for setting, of_setting in table.groupby(SETTING, sort=False):
-        knobs = dict(zip(SETTING, _floats(setting), strict=True))
-        for error, cost_ratio, reuse, sampler in product(ERRORS, COST_RATIOS, REUSE, SAMPLERS):
+        knobs = knobs_of(setting)
+        for error, cost_ratio, reuse, sampler in product(
+            ERRORS, COST_RATIOS, REUSE, samplers_of(table)
+        ):
             comparison = Comparison(of_setting, sampler, reuse, cost_ratio, error)
             row = {
                 **knobs, "error": error, "cost_ratio": cost_ratio, "reuse": reuse,
@@ -66,16 +68,18 @@ def _table(
         & (speedups["reuse"] == reuse)
         & (speedups["cost_ratio"] == BASE["cost_ratio"])
     ]
+    samplers = samplers_of(shown)
     rows = []
     for setting, of_setting in shown.groupby(SETTING, sort=False):
         by_sampler = {row["sampler"]: row for row in of_setting.to_dict("records")}
-        name = setting_name(dict(zip(SETTING, _floats(setting), strict=True)))
-        rows.append((Cell(name), *(Cell(text(by_sampler[sampler])) for sampler in SAMPLERS)))
-    return Table(title, ("setting", *SAMPLERS.values()), tuple(rows), 1)
+        name = setting_name(knobs_of(setting))
+        rows.append((Cell(name), *(Cell(text(by_sampler[sampler])) for sampler in samplers)))
+    return Table(title, ("setting", *samplers.values()), tuple(rows), 1)
 
 
-def _floats(setting: Any) -> list[float]:
-    return [float(value) for value in setting]
+def knobs_of(setting: Any) -> dict[str, float]:
+    """The knobs by name, of the values by which a table is grouped by `SETTING`."""
+    return {name: float(value) for name, value in zip(SETTING, setting, strict=True)}
 
 
 def setting_name(knobs: Mapping[str, float]) -> str:

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, Protocol
 
+from ngi.clock.phase_events import PhaseEvents
 from ngi.machine.energy import EnergyMeter
 
 PHASES = ("explore", "render", "reuse", "score", "train", "other")
@@ -52,6 +53,9 @@ class PhaseClock:
     Time that the process is stopped (SIGSTOP, Ctrl-Z) does: nothing tells it how long it stood
     still. To pause a run, end it (Ctrl-C) and start it again.
 
+    Where a GPU works behind the host, `divide_by` has its events say which phase was at it; what
+    they add up to stays the wall clock's.
+
     energy: is started and stopped with run time; None where nobody asks for it
     """
 
@@ -65,15 +69,22 @@ class PhaseClock:
     ) -> None:
         self._timer = timer
         self.energy = energy or EnergyMeter([])
+        self._events: PhaseEvents | None = None
         self._stack: list[str] = []
         self._since = 0.0
         self.seconds = dict.fromkeys((*PHASES, *PAUSES), 0.0)
+
+    def divide_by(self, events: PhaseEvents) -> None:
+        """Divides run time into phases by these, from the next `start` on."""
+        self._events = events
 
     def start(self) -> None:
         """Starts or restarts the clock in phase 'other'; time spent before does not count."""
         self._stack = ["other"]
         self._since = self._timer()
         self.energy.start()
+        if self._events is not None:
+            self._events.begin()
 
     def stop(self) -> None:
         """Counts what has passed and stands still."""
@@ -116,5 +127,16 @@ class PhaseClock:
     def _count(self) -> None:
         now = self._timer()
         if self._stack:
-            self.seconds[self._stack[-1]] += now - self._since
+            phase, seconds = self._stack[-1], now - self._since
+            self.seconds[phase] += seconds
+            if self._events is not None:
+                self._divide(self._events, phase, seconds)
         self._since = now
+
+    def _divide(self, events: PhaseEvents, phase: str, seconds: float) -> None:
+        if phase in PAUSES:
+            events.begin()  # again and again, until run time goes on
+        else:
+            events.end(phase, seconds)
+        for name, more in events.corrections().items():
+            self.seconds[name] += more

@@ -144,7 +144,8 @@ def _table(wanted: list[Component], *, new: list[Component], file: CostFile) -> 
     for component in wanted:
         for phase, seconds in costs[component.name].items():
             rows.append([component.key, phase, 1e3 * seconds, "new" if component in new else ""])
-    return tabulate(rows, headers=["component", "phase", "ms per step", ""], floatfmt=".2f")
+    table: str = tabulate(rows, headers=["component", "phase", "ms per step", ""], floatfmt=".2f")
+    return table
 
 
 # Its log is kept beside the cost file; the runs' own folders are left alone.

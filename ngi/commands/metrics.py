@@ -43,7 +43,8 @@ def _table(result: Mapping[str, Any], frames: Frames) -> str:
             found = None if None in values else mean(values)
             rows.append([set_name, name, None if told is None else told["mean"], found])
     headers = ["frames", "metric", "result.json", "recomputed"]
-    return tabulate(rows, headers, floatfmt=".6g", missingval="–")
+    table: str = tabulate(rows, headers, floatfmt=".6g", missingval="–")
+    return table
 
 
 def check(options: MetricsOptions) -> int:

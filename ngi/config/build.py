@@ -47,7 +47,9 @@ def build_stream(
         samples=samples,
         sampler=instantiate(config.sampler),
         reuse=Reuse(
-            store=instantiate(config.reuse.store)(layout=samples.layout),
+            store=instantiate(config.reuse.store)(
+                layout=samples.layout, device=_training_device(config)
+            ),
             archive=PatchArchive(patches),
             policy=instantiate(config.reuse.policy),
             when_late=config.reuse.when_late,
@@ -170,6 +172,14 @@ def run_costs(config: DictConfig, *, budget: Budget, renderer: Renderer) -> Cost
             "which batches are new; with budget.clock=model choose 'wait'"
         )
     return learn.CostFile(Path(budget.costs)).costs(run_components(config, renderer=renderer))
+
+
+def _training_device(config: DictConfig) -> str:
+    """Where Lightning's trainer trains."""
+    import torch
+
+    on_gpu = config.trainer.accelerator != "cpu" and torch.cuda.is_available()
+    return "cuda" if on_gpu else "cpu"
 
 
 def plain(config: DictConfig) -> dict[str, Any]:

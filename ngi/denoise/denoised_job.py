@@ -43,5 +43,9 @@ class DenoisedJob:
                 ]
             )
             mean = denoised.clamp_min(0).lerp(radiance, self._traced_share)
-            self._result = replace(traced, log_radiance=mean.log1p())
+            half = traced.first_half
+            if half is not None:  # of the noise, the traced share is what is left
+                change = half.cpu().expm1() - radiance
+                half = (mean + self._traced_share * change).clamp_min(0).log1p()
+            self._result = replace(traced, log_radiance=mean.log1p(), first_half=half)
         return self._result

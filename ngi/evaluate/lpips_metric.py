@@ -49,7 +49,8 @@ class Lpips:
             for image in (prediction, reference)
         )
         with torch.no_grad():
-            return self._network(x, y).item()
+            distance: Tensor = self._network(x, y)
+        return float(distance)
 
 
 def cached_weights() -> Path:

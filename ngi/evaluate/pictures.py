@@ -106,8 +106,8 @@ def error_picture(prediction: Tensor, reference: Tensor, epsilon: float) -> np.n
     Mean over the channels, linear from 0 to `ERROR_RANGE`, clipped; non-finite pixels in cyan.
     """
     error = ((prediction - reference).abs() / (reference + epsilon)).mean(dim=-1).cpu().numpy()
-    coloured = matplotlib.colormaps[COLOUR_MAP](np.nan_to_num(error) / ERROR_RANGE, bytes=True)
-    coloured = coloured[..., :3].copy()
+    with_alpha = matplotlib.colormaps[COLOUR_MAP](np.nan_to_num(error) / ERROR_RANGE, bytes=True)
+    coloured: np.ndarray = with_alpha[..., :3].copy()
     coloured[~np.isfinite(error)] = NON_FINITE
     return coloured
 

@@ -61,7 +61,10 @@ def write_atomically(
 def write_tensors(path: Path, content: dict[str, Any]) -> None:
     """`write_atomically` of what `torch.load` reads; the folder is made where it is missing."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_atomically(path, serialised(content).getbuffer())
+    # Let go of by hand: Python 3.12.1 crashes when its garbage collection finds the view in the
+    # traceback of a full disk's error (CPython's issues 77894 and 111049).
+    with serialised(content).getbuffer() as view:
+        write_atomically(path, view)
 
 
 def serialised(content: dict[str, Any]) -> io.BytesIO:

@@ -73,12 +73,13 @@ class RunFolder:
         if self.lengthened or self.restarted or not self._result.exists():
             return None
         try:
-            return json.loads(self._result.read_text())
+            result: dict[str, Any] = json.loads(self._result.read_text())
         except ValueError as error:
             raise ValueError(
                 f"{self._result} is damaged ({error}); delete it, and the same command evaluates "
                 "the run again from its last checkpoint"
             ) from error
+        return result
 
     @property
     def has_something(self) -> bool:

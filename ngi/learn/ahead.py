@@ -13,6 +13,7 @@ from typing import Any, Self
 import torch
 
 from ngi.explore import Proposals
+from ngi.learn.reading import read
 from ngi.learn.samples import Samples
 from ngi.patches import Patches
 from ngi.render.protocol import PatchJob, RenderedPatches
@@ -66,7 +67,8 @@ class ProposalsAhead:
     def unusable(self) -> str | None:
         """Which of the patches hold NaN or Inf, and how to render them again; None for none."""
         rendered = self.result()
-        broken = ~(_finite(rendered.buffers) & _finite(rendered.log_radiance))
+        finite = read(_finite(rendered.buffers), _finite(rendered.log_radiance))
+        broken = torch.stack(finite).amin(dim=0) == 0
         if not broken.any():
             return None
         return (
@@ -95,5 +97,5 @@ class ProposalsAhead:
 
 
 def _finite(patches: torch.Tensor) -> torch.Tensor:
-    """[n] bool, of patches [n, …]."""
-    return patches.isfinite().flatten(1).all(dim=1).cpu()
+    """[n] 1 or 0, of patches [n, …]."""
+    return patches.isfinite().flatten(1).all(dim=1).float()

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
 
-from ngi.patches import Patches
+from ngi.patches import Patches, uploaded
 
 
 @dataclass(frozen=True)
@@ -20,6 +20,7 @@ class Batch:
     current: [n] the chains' current states, to be scored beside the proposals; None where the
         acceptance rule does not look at them, on the first batch, and on reuse
     loss_weights: [n] factors of the samples' losses in the batch's mean; None for 1
+    first_half: of newly rendered patches, where the renderer gives it: see `RenderedPatches`
     """
 
     patches: Patches
@@ -27,11 +28,17 @@ class Batch:
     generated: bool
     current: Patches | None
     loss_weights: Tensor | None = None
+    first_half: Tensor | None = None
 
     def to(self, device: torch.device | str) -> Batch:
-        current = None if self.current is None else self.current.to(device)
-        weights = None if self.loss_weights is None else self.loss_weights.to(device)
-        return Batch(self.patches.to(device), self.ids.to(device), self.generated, current, weights)
+        """See `Patches.to`; the identities stay where they are."""
+        return replace(
+            self,
+            patches=self.patches.to(device),
+            current=None if self.current is None else self.current.to(device),
+            loss_weights=None if self.loss_weights is None else uploaded(self.loss_weights, device),
+            first_half=None if self.first_half is None else uploaded(self.first_half, device),
+        )
 
 
 @dataclass(frozen=True)
@@ -41,8 +48,10 @@ class Feedback:
     losses: [n] loss per sample, without weights
     target_proposed: [n] target density of the proposals; None where nothing had to be scored
     target_current: [n] that of the chains' current states
+    noise: [n] what a network that knew the truth would lose; None where nobody can tell
     """
 
     losses: Tensor
     target_proposed: Tensor | None
     target_current: Tensor | None
+    noise: Tensor | None = None

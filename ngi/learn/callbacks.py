@@ -7,9 +7,13 @@ evaluated before its state is saved.
 from __future__ import annotations
 
 from dataclasses import asdict
+from functools import partial
 from typing import Any
 
-from ngi.clock.phase_clock import RunClock
+import torch
+
+from ngi.clock.phase_clock import PhaseClock, RunClock
+from ngi.clock.phase_events import PhaseEvents
 from ngi.files.run_folder import RunFolder
 from ngi.learn.learning_rate import LearningRate
 from ngi.learn.lightning_api import Callback, LightningModule, Trainer
@@ -18,6 +22,20 @@ from ngi.learn.run import Run
 from ngi.learn.saving import BudgetAndCheckpoint
 from ngi.learn.stream import TrainingStream
 from ngi.learn.tracker import Tracker
+
+
+class PhasesOnGpu(Callback):
+    """Has the run's clock tell the phases apart by CUDA events, where the network is on a GPU.
+
+    It comes before `StepLog`, which starts the clock.
+    """
+
+    def __init__(self, clock: PhaseClock) -> None:
+        self._clock = clock
+
+    def on_train_start(self, trainer: Trainer, *_: Any) -> None:
+        if trainer.strategy.root_device.type == "cuda":
+            self._clock.divide_by(PhaseEvents(partial(torch.cuda.Event, enable_timing=True)))
 
 
 class StepLog(Callback):
@@ -113,6 +131,7 @@ def callbacks(
 ) -> list[Callback]:
     """All callbacks of a run, in the order that they depend on."""
     return [
+        PhasesOnGpu(run.clock),
         StepLog(stream=run.stream, run_clock=run.run_clock, folder=run.folder, tracker=run.tracker),
         LearningRate(run),
         PeriodicEvaluation(run, recorder=recorder, count=evaluations),

@@ -56,7 +56,8 @@ class AtomicCheckpointIO(TorchCheckpointIO):
     ) -> None:
         """Raises OSError with what to do where the disk is full; the old checkpoints stay."""
         content = {**checkpoint, IDENTITY: self._identity}
-        write_atomically(Path(path), checkpoint_bytes(content), keep_old_as=self._previous)
+        with checkpoint_bytes(content) as view:  # let go of as in `write_tensors`
+            write_atomically(Path(path), view, keep_old_as=self._previous)
 
 
 def prepare_resume(folder: RunFolder) -> Path | None:

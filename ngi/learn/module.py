@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from functools import wraps
 from inspect import signature
 from typing import Any, TypeVar
@@ -12,13 +13,16 @@ from torch import Tensor, nn
 
 from ngi.explore import Signals, Target
 from ngi.learn.batch import Batch
+from ngi.learn.captured_pass import CapturedPass
 from ngi.learn.checkpoint import STEP_GUARD
+from ngi.learn.graph_trainer import GraphTrainer
 from ngi.learn.lightning_api import LightningModule
 from ngi.learn.samples import Example
 from ngi.learn.scorer import Scorer
 from ngi.learn.step import Learner, Step, training_step
 from ngi.learn.step_guard import StepGuard
 from ngi.learn.stream import TrainingStream
+from ngi.machine.captured import Captured, Function
 from ngi.models import Averaging, SampleLoss, no_average
 from ngi.patches import Patches
 
@@ -54,6 +58,7 @@ class IlluminationModule(LightningModule):
         self._make_optimizer = optimizer
         self._example = example
         self._clock = stream.clock
+        self._image: Function = self._rendered
         self.learner = Learner(
             network=network,
             averaged=self.averaged,
@@ -81,12 +86,17 @@ class IlluminationModule(LightningModule):
         score(prediction, losses)
 
     def on_fit_start(self) -> None:
-        """ValueError for float16, whose losses have to be scaled for their gradients' sake."""
+        """ValueError for float16, whose losses have to be scaled for their gradients' sake.
+
+        With a `GraphTrainer` what is computed is recorded from here on.
+        """
         if getattr(self.trainer.precision_plugin, "scaler", None) is not None:
             raise ValueError(
                 f"trainer.precision: {self.trainer.precision} is not supported; "
                 "choose bf16-mixed (trainer=bf16) or 32-true (trainer=fp32)"
             )
+        if isinstance(self.trainer, GraphTrainer):
+            self._record()
 
     def training_step(self, batch: Batch, batch_idx: int) -> dict[str, Step]:  # noqa: ARG002
         """Takes the step, and hands `Step` to the callbacks under the key 'step'."""
@@ -111,10 +121,9 @@ class IlluminationModule(LightningModule):
 
         By the averaged weights where there are such. On the CPU, wherever the network is.
         """
-        network = self.network if self.averaged is None else self.averaged.module
         on_device = (tensor.to(self.device) for tensor in (buffers, *inputs))
         with torch.no_grad(), self.trainer.precision_plugin.forward_context():
-            output = network.render(*on_device)  # type: ignore[operator]
+            output: Tensor = self._image(*on_device)[0]
         return output.float().cpu()
 
     def signals(self, patches: Patches, target: Target) -> Signals:
@@ -124,6 +133,20 @@ class IlluminationModule(LightningModule):
         """
         with self.trainer.precision_plugin.forward_context():
             return self._scorer_of(target).signals(patches.to(self.device), self._optimizer())
+
+    def _record(self) -> None:
+        precision = self.trainer.precision_plugin.forward_context
+        captured = CapturedPass(self.network, self.loss, precision=precision)
+        self.learner = replace(self.learner, captured=captured)
+        self._image = Captured(self._rendered, module=self._shown, name="images")
+
+    @property
+    def _shown(self) -> nn.Module:
+        """The network that images are made by."""
+        return self.network if self.averaged is None else self.averaged.module
+
+    def _rendered(self, *inputs: Tensor) -> tuple[Tensor]:
+        return (self._shown.render(*inputs),)  # type: ignore[operator]
 
     def _check_inputs(self, patches: Patches) -> None:
         if not hasattr(self.network, "render"):

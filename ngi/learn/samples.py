@@ -11,8 +11,10 @@ from torch import Tensor, nn
 
 from ngi.denoise.denoised_job import DenoisedJob
 from ngi.denoise.denoisers import Denoiser
+from ngi.learn.halves import HalvesJob
 from ngi.patches import BufferLayout, Patches
 from ngi.render.protocol import PatchJob, Renderer
+from ngi.render.tracing import derive_seed
 
 Example = tuple[tuple[Tensor, ...], Tensor]
 """The network's inputs, its arguments in order, and the log1p radiance that it is to give."""
@@ -77,6 +79,8 @@ class PatchSamples:
         buffers say where the point is and which direction
     denoiser: takes the noise off newly traced radiance, or None
     traced_share: see `DenoisedJob`
+    halves: whether each patch is the mean of two renderings, so that its noise is known
+        (`ngi.learn.noise`); the renderer's samples per pixel are then those of each
 
     components: which of v, [0, D), the network is given, in order
     Raises ValueError for a share that is none.
@@ -89,12 +93,14 @@ class PatchSamples:
         camera: bool = True,
         denoiser: Denoiser | None = None,
         traced_share: float = 0.5,
+        halves: bool = False,
     ) -> None:
         if not 0 <= traced_share <= 1:
             raise ValueError(f"data.traced_share is {traced_share}; expected 0 to 1")
         self._renderer = renderer
         self._denoiser = denoiser
         self._traced_share = traced_share
+        self._halves = halves
         self.layout = renderer.layout
         self.dimensions = renderer.dimensions
         self.patch_size = renderer.patch_size
@@ -117,6 +123,11 @@ class PatchSamples:
     def start_patches(self, states: Tensor, *, resolution: int, seed: int) -> PatchJob:
         """See `Samples.start_patches`."""
         job = self._renderer.start_patches(states, resolution=resolution, seed=seed)
+        if self._halves:
+            other = derive_seed(seed, b"second half")
+            job = HalvesJob(
+                job, self._renderer.start_patches(states, resolution=resolution, seed=other)
+            )
         if self._denoiser is None:
             return job
         return DenoisedJob(job, self._denoiser, traced_share=self._traced_share, layout=self.layout)

@@ -19,6 +19,8 @@ from torch import Tensor, nn
 from torch.optim.swa_utils import AveragedModel
 
 from ngi.learn.batch import Batch, Feedback
+from ngi.learn.captured_pass import CapturedPass
+from ngi.learn.noise import noise_loss
 from ngi.learn.reading import read
 from ngi.learn.samples import Example
 from ngi.learn.scorer import Scorer, Scores
@@ -40,6 +42,7 @@ class Learner:
     scorer: asks the network for the target density of the chains' states
     guard: refuses or scales down steps that would do harm
     stream: where batches come from, and who learns from each step
+    captured: takes forward and backward pass of steps that score nothing; None for kernel by kernel
     """
 
     network: nn.Module
@@ -49,6 +52,7 @@ class Learner:
     scorer: Scorer
     guard: StepGuard
     stream: TrainingStream
+    captured: CapturedPass | None = None
 
     def losses(self, patches: Patches) -> tuple[Tensor, Tensor]:
         """Loss per sample [n], and what the network answered [n, H, W, 3]."""
@@ -84,17 +88,13 @@ def training_step(
     """
     clock = learner.stream.clock
     with clock.phase("train"):
-        with precision():
-            losses, scores = _forward(batch, learner, optimizer)
-            weighted = losses if batch.loss_weights is None else losses * batch.loss_weights
-            loss = weighted.mean()
-        optimizer.zero_grad()
-        loss.backward()
+        losses, loss, scores = _backward(batch, learner, optimizer, precision)
         with clock.phase("score"):
             asked = () if scores is None else (scores[0](), scores[1])
+            noise = () if batch.first_half is None else (noise_loss(learner.loss, batch),)
         # The one time that a step waits for the device: its time is training's.
         norms = gradient_norm(learner.network), largest_moment(optimizer)
-        told, mean, norm, moment, *targets = read(losses, loss, *norms, *asked)
+        told, mean, norm, moment, *others = read(losses, loss, *norms, *noise, *asked)
         step = Step(float(mean), float(norm))
         learner.guard.admit(
             Attempt(
@@ -111,9 +111,28 @@ def training_step(
         if learner.averaged is not None:
             learner.averaged.update_parameters(learner.network)
     # The chains accept or refuse what they proposed; store and policy learn of the losses.
-    proposed, current = targets or (None, None)
-    learner.stream.feedback(Feedback(told, proposed, current))
+    of_noise = others.pop(0) if noise else None
+    proposed, current = others or (None, None)
+    learner.stream.feedback(Feedback(told, proposed, current, of_noise))
     return step
+
+
+def _backward(
+    batch: Batch,
+    learner: Learner,
+    optimizer: torch.optim.Optimizer,
+    precision: Callable[[], AbstractContextManager[Any]],
+) -> tuple[Tensor, Tensor, Scores | None]:
+    """Leaves the gradient; loss per sample [n], weighted mean, and the scores of `_forward`."""
+    if learner.captured is not None and batch.current is None:
+        return *learner.captured(learner.example(batch.patches), batch.loss_weights), None
+    with precision():
+        losses, scores = _forward(batch, learner, optimizer)
+        weighted = losses if batch.loss_weights is None else losses * batch.loss_weights
+        loss = weighted.mean()
+    optimizer.zero_grad()
+    loss.backward()
+    return losses, loss, scores
 
 
 def _forward(

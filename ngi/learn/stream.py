@@ -22,6 +22,7 @@ from ngi.explore import ChainInfo, ChainState, ResolutionSchedule, Sampler
 from ngi.learn.ahead import ProposalsAhead
 from ngi.learn.batch import Batch, Feedback
 from ngi.learn.chain_trace import chain_record
+from ngi.learn.noise import without_noise
 from ngi.learn.samples import Samples
 from ngi.reuse import Reuse
 
@@ -232,8 +233,14 @@ class TrainingStream:
             score_current = self.sampler.needs_current and bool(self._chains.occupied.all())
             current = self.store.get(self._chains.patch) if score_current else None
         self.counters.scored_batches += score_current
-        weights = ahead.proposals.weight
-        return Batch(patches, ids, generated=True, current=current, loss_weights=weights)
+        return Batch(
+            patches,
+            ids,
+            generated=True,
+            current=current,
+            loss_weights=ahead.proposals.weight,
+            first_half=ahead.result().first_half,
+        )
 
     def _usable(self, ahead: ProposalsAhead) -> ProposalsAhead:
         """The proposals, rendered, or others where the patches of these hold NaN or Inf.
@@ -265,7 +272,7 @@ class TrainingStream:
             target_current=unscored if current is None else current,
             target_proposed=unscored if proposed is None else proposed,
             generator=self._generator,
-            losses=losses,
+            losses=losses if feedback.noise is None else without_noise(losses, feedback.noise),
         )
         self.chain_record = chain_record(
             self._ahead.proposals,

@@ -108,7 +108,7 @@ def map_states(cells: int, positions_per_cell: int) -> Tensor:
         SobolEngine(4, scramble=True, seed=cell).draw(positions_per_cell)
         for cell in range(cells**2)
     ]
-    states = torch.stack(points).unflatten(0, (cells, cells))
+    states: Tensor = torch.stack(points).unflatten(0, (cells, cells))
     index = torch.arange(cells)
     corners = torch.stack(torch.meshgrid(index, index, indexing="ij"), dim=-1)
     states[..., :2] = (states[..., :2] + corners[:, :, None]) / cells

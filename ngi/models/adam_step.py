@@ -64,7 +64,8 @@ class AdamStep:
         denominator = torch.addcmul(self.second, g, g, value=self.second_gain)
         denominator.sqrt_().add_(self.epsilon)
         step = torch.add(self.first, g, alpha=self.first_gain).div_(denominator)
-        return torch.linalg.vector_norm(step.flatten(1), dim=1)
+        norms: Tensor = torch.linalg.vector_norm(step.flatten(1), dim=1)
+        return norms
 
 
 def gradients_per_chunk(parameter: Tensor) -> int:

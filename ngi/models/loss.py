@@ -99,7 +99,8 @@ class L1Dssim:
         mean_x, mean_y = mean_x + offset_x, mean_y + offset_y
         luminance = (2 * mean_x * mean_y + c1) / (mean_x * mean_x + mean_y * mean_y + c1)
         structure = (2 * covariance + c2) / (variances + c2)
-        return (luminance * structure).mean(dim=(1, 2, 3))
+        similarity: Tensor = (luminance * structure).mean(dim=(1, 2, 3))
+        return similarity
 
     def _filter(self, images: Tensor) -> Tensor:
         """Weighted means over every window that lies within the last two dimensions.

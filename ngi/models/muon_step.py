@@ -75,4 +75,5 @@ class MuonStep:
 
     def _norm(self, g: Tensor) -> Tensor:
         update = torch.add(self.momentum, g, alpha=self.gain)
-        return torch.linalg.vector_norm(update.flatten(1), dim=1)
+        norms: Tensor = torch.linalg.vector_norm(update.flatten(1), dim=1)
+        return norms

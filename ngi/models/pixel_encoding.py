@@ -60,7 +60,8 @@ class PixelEncoding(nn.Module):
     def features(self) -> int:
         """Numbers per pixel that the network is given."""
         buffers = torch.zeros(1, 1, self._layout.channels)
-        return self(buffers, torch.zeros(1, self._components), torch.float32).shape[-1]
+        encoded: Tensor = self(buffers, torch.zeros(1, self._components), torch.float32)
+        return encoded.shape[-1]
 
     def forward(self, buffers: Tensor, scene_vector: Tensor, precision: torch.dtype) -> Tensor:
         """Buffers [n, p, C] in float32 and v [n, D] to features [n, p, I] in `precision`.

@@ -156,10 +156,11 @@ class PixelGenerator(nn.Module):
         return last(features, inputs)
 
     def _first_layer(self, pixels: Tensor, inputs: Tensor, scene_vector: Tensor) -> Tensor:
-        if not self.position_preconditioning:
-            return self.input_layer((inputs,), scene_vector)
-        position = pixels[..., self.layout.slice("position")]
-        return self.input_layer((position,), scene_vector[:, :0])
+        seen = inputs
+        if self.position_preconditioning:
+            seen, scene_vector = pixels[..., self.layout.slice("position")], scene_vector[:, :0]
+        features: Tensor = self.input_layer((seen,), scene_vector)
+        return features
 
     def _activate(self, features: Tensor) -> Tensor:
         # In place: PatchLinear's output is kept by nobody else, and memory traffic is what a

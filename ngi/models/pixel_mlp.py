@@ -78,8 +78,8 @@ class PixelMLP(nn.Module):
             output = _Layers.apply(self.watcher, *arguments)  # type: ignore[no-untyped-call]
         else:
             output, _, _ = _forward(*arguments)
-        assert isinstance(output, Tensor)
-        return output.unflatten(0, pixels.shape[:2])
+        by_patch: Tensor = output.unflatten(0, pixels.shape[:2])
+        return by_patch
 
     def _show_of_patches(self, watcher: SampleGradients, patch: Tensor, g: Tensor) -> None:
         """g: gradient of each patch's bias in the first layer, [n, H]; patch: [n, D]."""
@@ -159,7 +159,8 @@ def _of_bias(g: Tensor, bias: Tensor, patches: int, watcher: SampleGradients | N
 
 
 def _per_patch(rows: Tensor, patches: int) -> Tensor:
-    return rows.unflatten(0, (patches, -1))
+    by_patch: Tensor = rows.unflatten(0, (patches, -1))
+    return by_patch
 
 
 def _forward(

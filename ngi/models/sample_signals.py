@@ -26,7 +26,8 @@ def output_gradient_norm(prediction: Tensor, target: Tensor, loss: SampleLoss) -
     with torch.enable_grad():
         output = prediction.detach().requires_grad_()
         (gradient,) = torch.autograd.grad(loss(output, target).sum(), output)
-    return torch.linalg.vector_norm(gradient.flatten(1), dim=1)
+    norms: Tensor = torch.linalg.vector_norm(gradient.flatten(1), dim=1)
+    return norms
 
 
 def sample_step_norm(

@@ -104,7 +104,13 @@ class ClosedFormRenderer(ABC):
         number = derive_seed(seed, scene_vector.numpy().tobytes(), resolution)
         return self._noisy(clean, samples_per_pixel, number)
 
-    def image_buffers(self, scene_vector: Tensor, *, resolution: int) -> Tensor:
+    def image_buffers(
+        self,
+        scene_vector: Tensor,
+        *,
+        resolution: int,
+        samples: int | None = None,  # noqa: ARG002 - of the pixels' centres
+    ) -> Tensor:
         """See `ngi.render.Renderer.image_buffers`."""
         buffers, _ = self.whole_image(scene_vector, resolution)
         return buffers

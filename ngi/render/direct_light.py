@@ -32,7 +32,8 @@ def light_points(count: int) -> NDArray[np.float64]:
     """
     cells = 2 ** int(count - 1).bit_length()
     sobol = SobolEngine(max(_SOBOL_DIMENSIONS) + 1).draw(count).double().numpy()
-    return sobol[:, _SOBOL_DIMENSIONS] + 0.5 / cells
+    points: NDArray[np.float64] = sobol[:, _SOBOL_DIMENSIONS] + 0.5 / cells
+    return points
 
 
 def direct_light(

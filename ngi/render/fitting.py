@@ -78,13 +78,17 @@ class FittingTracer:
             for half, s in zip(_halves(window), seeds, strict=True)
         )
 
-    def buffers(self, window: Window) -> Pending:
+    def buffers(self, window: Window, *, samples: int) -> Pending:
         """See `Tracer.buffers`; the same numbers, however it is split."""
-        whole = self._attempt("buffers", _pixels(window), lambda: self._tracer.buffers(window))
+        whole = self._attempt(
+            "buffers",
+            _pixels(window) * samples,
+            lambda: self._tracer.buffers(window, samples=samples),
+        )
         if whole is not None:
             return whole
         self._halve(window, 1)
-        return _stacked(self.buffers(half) for half in _halves(window))
+        return _stacked(self.buffers(half, samples=samples) for half in _halves(window))
 
     def _attempt(self, what: str, size: int, launch: Callable[[], Pending]) -> Pending | None:
         """None for what does not fit."""

@@ -17,6 +17,7 @@ import torch
 from torch import Tensor
 
 from ngi.machine.backend import dr, mi
+from ngi.machine.hand_over import stacked
 from ngi.render.direct_light import light_points
 from ngi.render.first_hit import FirstHit
 from ngi.render.fitting import does_not_fit
@@ -33,19 +34,14 @@ _logger = logging.getLogger(__name__)
 class JitTracer:
     """The `ngi.render.tracing.Tracer` of the JIT variants; results are computed asynchronously.
 
-    frozen: replay recorded kernel launches instead of tracing the Python code again, which is
-        worth it for many windows of one size (patches), not for a few (images).
+    Of each size of window and number of samples the kernel launches are recorded once and then
+    replayed: tracing the Python code takes up to a fifth of a second in a scene of many materials,
+    whatever the size.
     """
 
-    def __init__(
-        self, *, scene: mi.Scene, first_hit: FirstHit, buffer_samples: int, frozen: bool
-    ) -> None:
+    def __init__(self, *, scene: mi.Scene, first_hit: FirstHit) -> None:
         self._scene = scene
-        self._buffer_samples = buffer_samples
-        points = subpixel_points(buffer_samples)
-        self._points = mi.Point2f(points[:, 0], points[:, 1])
-        self._light_points = [mi.Float(numbers) for numbers in light_points(buffer_samples).T]
-        dr.eval(self._points, self._light_points)
+        self._points: dict[int, tuple[mi.Point2f, list[mi.Float]]] = {}
         # Plain functions, not methods: a frozen function follows the arrays of its arguments only,
         # and holds what is constant for this tracer in its closure.
         integrator = scene.integrator()
@@ -76,10 +72,10 @@ class JitTracer:
             channels = first_hit.channels(scene, view.rays(scene, pixel, jitter), light_point)
             return _block_sums(channels, samples)
 
-        self._radiance = _replayed(trace_radiance) if frozen else trace_radiance
-        self._buffers = _replayed(trace_buffers) if frozen else trace_buffers
+        self._radiance = _replayed(trace_radiance)
+        self._buffers = _replayed(trace_buffers)
         self._trace_radiance = trace_radiance
-        self._ready = not frozen
+        self._ready = False
 
     def radiance(self, window: Window, *, samples: int, seed: int) -> Pending:
         self._prepare(window)
@@ -88,13 +84,13 @@ class JitTracer:
         sums = self._radiance(self._scene, view, dr.opaque(mi.UInt32, seed), samples, paths)
         return _pending(sums, window, samples)
 
-    def buffers(self, window: Window) -> Pending:
+    def buffers(self, window: Window, *, samples: int) -> Pending:
         self._prepare(window)
-        samples = self._buffer_samples
+        if samples not in self._points:
+            self._points[samples] = _points(samples)
         view = _View.of(window, samples)
         rays = window.width * window.height * samples
-        points = self._points, self._light_points
-        sums = self._buffers(self._scene, view, *points, samples, rays)
+        sums = self._buffers(self._scene, view, *self._points[samples], samples, rays)
         return _pending(sums, window, samples)
 
     def _prepare(self, window: Window) -> None:
@@ -114,11 +110,22 @@ class JitTracer:
         self._ready = True
 
 
+def _points(samples: int) -> tuple[mi.Point2f, list[mi.Float]]:
+    """Where in each pixel its rays go through, and the numbers that go with each for the light."""
+    points = subpixel_points(samples)
+    on_device = (
+        mi.Point2f(points[:, 0], points[:, 1]),
+        [mi.Float(numbers) for numbers in light_points(samples).T],
+    )
+    dr.eval(on_device)
+    return on_device
+
+
 def _replayed(function: Trace) -> Trace:
     """The function with its kernel launches recorded and replayed, where Dr.Jit can do that.
 
     Dr.Jit 1.5 cannot always, for example where another scene was loaded meanwhile: then Python
-    traces the function again for every patch, which costs time but compiles nothing either.
+    traces the function again every time, which costs time but compiles nothing either.
     """
     # A variable material makes a recording for every combination of the choices.
     recorded, works = dr.freeze(function, warn_after=RECORDINGS), True
@@ -132,7 +139,7 @@ def _replayed(function: Trace) -> Trace:
                 if does_not_fit(error):
                     raise
                 works = False
-                _logger.warning("patches of this scene take longer: %s", error)
+                _logger.warning("pictures of this scene take longer: %s", error)
         return function(*arguments)
 
     return trace
@@ -188,11 +195,7 @@ def _block_sums(values: list[mi.Float], samples: int) -> list[mi.Float]:
 
 def _pending(sums: list[mi.Float], window: Window, samples: int) -> Pending:
     def read() -> Tensor:
-        dr.sync_thread()
-        mean = torch.stack([torch.utils.dlpack.from_dlpack(channel) for channel in sums], dim=-1)
-        mean /= samples
-        if mean.is_cuda:
-            torch.cuda.synchronize()  # before Dr.Jit uses the memory of the sums again
+        mean = stacked(sums).div_(samples)
         return mean.view(window.height, window.width, len(sums))
 
     return read

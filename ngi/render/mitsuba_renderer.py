@@ -5,7 +5,6 @@ from __future__ import annotations
 import gc
 import logging
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import torch
@@ -86,11 +85,8 @@ class MitsubaRenderer:
             trace_specular=specular == "traced",
             trace_direct=direct == "traced",
         )
-        buffer_samples = buffer_samples or BUFFER_SAMPLES[self._variant]
-        self.buffer_samples = buffer_samples
-        self._patch_tracer, self._image_tracer = _tracers(
-            self._variant, self._scene.scene, first_hit, buffer_samples
-        )
+        self.buffer_samples = buffer_samples or BUFFER_SAMPLES[self._variant]
+        self._tracer = _tracer(self._variant, self._scene.scene, first_hit)
         self.layout = first_hit.layout
         self._static = needed_only and buffers_are_static(self._scene, self.layout)
         self._static_buffers: dict[int, Tensor] = {}
@@ -123,26 +119,24 @@ class MitsubaRenderer:
         mi.set_variant(self._variant)
         sizes = self._passes
         pending = [self._launch_patch(state, resolution, seed, sizes=sizes) for state in states]
-        results, repaired, masked, renderings = [], 0, 0, len(states)
-        for state, (radiance, buffers) in zip(states, pending, strict=True):
-            patch = radiance(), buffers()
-            if not _finite(*patch):
-                repaired, renderings = repaired + 1, renderings + 1
-                retry = self._launch_patch(state, resolution, seed, sizes=sizes, attempt=1)
-                patch = retry[0](), retry[1]()
-                if not _finite(*patch):
-                    masked += 1
-                    patch = _masked(patch[0]), _masked(patch[1])
-            results.append(patch)
+        results = [(radiance(), buffers()) for radiance, buffers in pending]
+        again = _broken(results)
+        for index in again:
+            retry = self._launch_patch(states[index], resolution, seed, sizes=sizes, attempt=1)
+            results[index] = retry[0](), retry[1]()
+        masked = [again[place] for place in _broken([results[index] for index in again])]
+        for index in masked:
+            radiance, buffers = results[index]
+            results[index] = _masked(radiance), _masked(buffers)
         P = self.patch_size
         radiance_tensor = _stack([r for r, _ in results], (P, P, 3))
         buffer_tensor = _stack([b for _, b in results], (P, P, self.layout.channels))
         return RenderedPatches(
             buffers=self._encode(buffer_tensor),
             log_radiance=torch.log1p(radiance_tensor),
-            repaired=repaired,
-            masked=masked,
-            paths=renderings * P * P * self.samples_per_pixel,
+            repaired=len(again),
+            masked=len(masked),
+            paths=(len(states) + len(again)) * P * P * self.samples_per_pixel,
         )
 
     def start_patches(self, states: Tensor, *, resolution: int, seed: int) -> Deferred:
@@ -167,17 +161,20 @@ class MitsubaRenderer:
             for start in range(0, samples_per_pixel, SAMPLES_PER_PASS):
                 samples = min(SAMPLES_PER_PASS, samples_per_pixel - start)
                 number = derive_seed(seed, state, resolution, band.y, start)
-                radiance = self._image_tracer.radiance(band, samples=samples, seed=number)()
+                radiance = self._tracer.radiance(band, samples=samples, seed=number)()
                 total += samples * radiance.cpu().double()
             rows.append(total / samples_per_pixel)
         return torch.cat(rows).float()
 
-    def image_buffers(self, scene_vector: Tensor, *, resolution: int) -> Tensor:
+    def image_buffers(
+        self, scene_vector: Tensor, *, resolution: int, samples: int | None = None
+    ) -> Tensor:
         """See `ngi.render.Renderer.image_buffers`; the same as a patch's at the same pixels."""
-        require_positive(resolution=resolution)
+        samples = self.buffer_samples if samples is None else samples
+        require_positive(resolution=resolution, samples=samples)
         mi.set_variant(self._variant)
         self._scene.apply(scene_vector)
-        return self._encode(self._whole_buffers(resolution))
+        return self._encode(self._whole_buffers(resolution, samples))
 
     def cameras(self, scene_vectors: Tensor) -> Tensor:
         """See `ngi.render.Renderer.cameras`."""
@@ -198,9 +195,7 @@ class MitsubaRenderer:
 
     def close(self) -> None:
         """See `ngi.render.Renderer.close`; says how many launches did not fit into memory."""
-        tracers = (self._patch_tracer, self._image_tracer)
-        split = sum(tracer.split for tracer in tracers if isinstance(tracer, FittingTracer))
-        if split:
+        if isinstance(self._tracer, FittingTracer) and (split := self._tracer.split):
             _logger.warning("%d launches did not fit into memory and were traced in parts", split)
 
     def _launch_patch(
@@ -211,7 +206,7 @@ class MitsubaRenderer:
         self._scene.apply(state[:-2])
         parts = (seed, state.numpy().tobytes(), resolution, attempt)
         launches = [
-            self._patch_tracer.radiance(window, samples=samples, seed=derive_seed(*parts, i))
+            self._tracer.radiance(window, samples=samples, seed=derive_seed(*parts, i))
             for i, samples in enumerate(sizes)
         ]
 
@@ -220,18 +215,20 @@ class MitsubaRenderer:
             return torch.stack(sums).sum(dim=0) / sum(sizes)
 
         if not self._static:
-            return radiance, self._patch_tracer.buffers(window)
+            return radiance, self._tracer.buffers(window, samples=self.buffer_samples)
         if resolution not in self._static_buffers:  # of the growing resolutions, the last one
-            self._static_buffers = {resolution: self._whole_buffers(resolution)}
+            self._static_buffers = {
+                resolution: self._whole_buffers(resolution, self.buffer_samples)
+            }
         rows = slice(window.y, window.y + window.height)
         columns = slice(window.x, window.x + window.width)
         buffers = self._static_buffers[resolution][rows, columns]
         return radiance, lambda: buffers
 
-    def _whole_buffers(self, resolution: int) -> Tensor:
+    def _whole_buffers(self, resolution: int, samples: int) -> Tensor:
         """[H, W, C] of the scene as it stands, radiance linear; no NaN or Inf."""
-        all_bands = bands(resolution, self.buffer_samples)
-        return torch.cat([_masked(self._image_tracer.buffers(band)()) for band in all_bands])
+        all_bands = bands(resolution, samples)
+        return _masked(torch.cat([self._tracer.buffers(b, samples=samples)() for b in all_bands]))
 
     def _encode(self, buffers: Tensor) -> Tensor:
         """Emission and direct light become log1p of their means, in place."""
@@ -255,24 +252,18 @@ class MitsubaRenderer:
             )
 
 
-def _tracers(
-    variant: str, scene: mi.Scene, first_hit: FirstHit, buffer_samples: int
-) -> tuple[Tracer, Tracer]:
-    """That of patches, whose launches are recorded once, and that of whole images."""
-    parts: dict[str, Any] = {
-        "scene": scene,
-        "first_hit": first_hit,
-        "buffer_samples": buffer_samples,
-    }
+def _tracer(variant: str, scene: mi.Scene, first_hit: FirstHit) -> Tracer:
     if variant == "scalar_rgb":
-        tracer = ScalarTracer(**parts)
-        return tracer, tracer
-    recorded, direct = (JitTracer(**parts, frozen=frozen) for frozen in (True, False))
-    return FittingTracer(recorded, free=free_memory), FittingTracer(direct, free=free_memory)
+        return ScalarTracer(scene=scene, first_hit=first_hit)
+    return FittingTracer(JitTracer(scene=scene, first_hit=first_hit), free=free_memory)
 
 
-def _finite(*tensors: Tensor) -> bool:
-    return all(bool(tensor.isfinite().all()) for tensor in tensors)
+def _broken(patches: list[tuple[Tensor, Tensor]]) -> list[int]:
+    """Which of them hold a NaN or Inf; the host waits for all of them at once."""
+    if not patches:
+        return []
+    finite = torch.stack([t.isfinite().all() for patch in patches for t in patch]).view(-1, 2)
+    return [index for index, whole in enumerate(finite.all(dim=1).tolist()) if not whole]
 
 
 def _masked(tensor: Tensor) -> Tensor:

@@ -113,6 +113,12 @@ class PocketRenderer(ClosedFormRenderer):
         moved = torch.frac(centre + self.side * (points[:, : self.active] - 0.5) + 1)
         return torch.cat([moved, points[:, self.active :]], dim=1)
 
+    def boxes(self, scene_vectors: Tensor) -> Tensor:
+        """[n]: how many pockets' boxes hold each v of [n, D]."""
+        inside = self._offsets(scene_vectors).abs() <= self.side / 2
+        count: Tensor = inside.all(-1).sum(1)
+        return count
+
     def weights(self, scene_vectors: Tensor) -> Tensor:
         """[n, pockets]: how far each effect is switched on, in [0, 1], for v [n, D]."""
         return self._weights(self._offsets(scene_vectors))
@@ -137,9 +143,11 @@ class PocketRenderer(ClosedFormRenderer):
     def _weights(self, offsets: Tensor) -> Tensor:
         inside = self.side / 2 - offsets.abs()
         if self._edge == 0:
-            return (inside >= 0).all(-1).float()
+            within: Tensor = (inside >= 0).all(-1)
+            return within.float()
         ramp = (inside / self._edge + 0.5).clamp(0, 1)
-        return (ramp * ramp * (3 - 2 * ramp)).prod(-1)
+        weights: Tensor = (ramp * ramp * (3 - 2 * ramp)).prod(-1)
+        return weights
 
     def _effect(self, pocket: int, offset: Tensor, points: Tensor) -> Tensor:
         """[h, w, 3]: a pocket's effect at full weight; offset: [A], points: [h, w, 2]."""

@@ -18,6 +18,8 @@ class RenderedPatches:
     repaired: number of patches that held NaN or Inf and were rendered again with another seed.
     masked: number of patches that still held such pixels, which were then set to zero.
     paths: number of camera paths traced for the radiance.
+    first_half: as log_radiance, by the first half of each pixel's samples alone; None where nobody
+        asked for it. How far it is from log_radiance tells the noise of that.
     """
 
     buffers: Tensor
@@ -25,6 +27,7 @@ class RenderedPatches:
     repaired: int
     masked: int
     paths: int
+    first_half: Tensor | None = None
 
 
 class PatchJob(Protocol):
@@ -108,9 +111,12 @@ class Renderer(Protocol):
         """
         ...
 
-    def image_buffers(self, scene_vector: Tensor, *, resolution: int) -> Tensor:
+    def image_buffers(
+        self, scene_vector: Tensor, *, resolution: int, samples: int | None = None
+    ) -> Tensor:
         """[H, W, C] float32: the first-hit buffers of the same pixels, as `layout` names them.
 
+        samples: rays per pixel; `buffer_samples` where None
         On the device that renders, so that a network on the same GPU need not wait for copies.
         Without noise, so there is no seed. A pixel with NaN or Inf is zero in all channels.
         """

@@ -20,11 +20,9 @@ class ScalarTracer:
     buffers come from a Python loop over pixels, so that only few samples are affordable.
     """
 
-    def __init__(self, *, scene: mi.Scene, first_hit: FirstHit, buffer_samples: int) -> None:
+    def __init__(self, *, scene: mi.Scene, first_hit: FirstHit) -> None:
         self._scene = scene
         self._first_hit = first_hit
-        self._points = subpixel_points(buffer_samples)
-        self._light_points = light_points(buffer_samples)
         self._sensor = _box_filtered_copy(scene.sensors()[0])
         self._copy = mi.traverse(self._sensor)
 
@@ -43,9 +41,10 @@ class ScalarTracer:
         result = torch.from_numpy(np.array(image, dtype=np.float32))
         return lambda: result
 
-    def buffers(self, window: Window) -> Pending:
+    def buffers(self, window: Window, *, samples: int) -> Pending:
+        points, lights = subpixel_points(samples), light_points(samples).tolist()
         means = [
-            self._pixel(window.x + column, window.y + row, window.resolution)
+            self._pixel(points, lights, window.x + column, window.y + row, window.resolution)
             for row in range(window.height)
             for column in range(window.width)
         ]
@@ -53,14 +52,24 @@ class ScalarTracer:
         result = torch.from_numpy(numbers)
         return lambda: result
 
-    def _pixel(self, x: int, y: int, resolution: int) -> NDArray[np.float64]:
+    def _pixel(
+        self,
+        points: NDArray[np.float64],
+        lights: list[list[float]],
+        x: int,
+        y: int,
+        resolution: int,
+    ) -> NDArray[np.float64]:
+        """points, lights: [n, 2] and [n, 5], of `subpixel_points` and `light_points`"""
         sensor = self._scene.sensors()[0]
-        samples = []
-        points = (self._points + np.array([x, y])) / resolution
-        for point, light_point in zip(points, self._light_points, strict=True):
+        samples: list[list[mi.Float]] = []
+        for point, light_point in zip(
+            (points + np.array([x, y])) / resolution, lights, strict=True
+        ):
             ray, _ = sensor.sample_ray(0, 0, mi.Point2f(point), mi.Point2f(0.5))
-            samples.append(self._first_hit.channels(self._scene, ray, light_point.tolist()))
-        return np.mean(np.array(samples, dtype=np.float64), axis=0)
+            samples.append(self._first_hit.channels(self._scene, ray, light_point))
+        mean: NDArray[np.float64] = np.mean(np.array(samples, dtype=np.float64), axis=0)
+        return mean
 
 
 def _box_filtered_copy(sensor: mi.Sensor) -> mi.Sensor:

@@ -34,8 +34,11 @@ class Tracer(Protocol):
         """Mean linear RGB radiance over `samples` paths per pixel, box-filtered. seed: 32 bits."""
         ...
 
-    def buffers(self, window: Window) -> Pending:
-        """Mean first-hit channels (radiance linear) over the same sub-pixel points everywhere."""
+    def buffers(self, window: Window, *, samples: int) -> Pending:
+        """Mean first-hit channels (radiance linear) over the same sub-pixel points everywhere.
+
+        samples: how many there are in each pixel
+        """
         ...
 
 

@@ -48,8 +48,8 @@ class Watchdog:
         lost: workers that have died or been ended in a row.
         """
         if not patches or self._slowest is None:
-            return STARTING_SECONDS * 2**lost
-        return max(SHORTEST_SECONDS, TIMES_THE_SLOWEST * self._slowest * patches) * 2**lost
+            return STARTING_SECONDS * 2.0**lost
+        return max(SHORTEST_SECONDS, TIMES_THE_SLOWEST * self._slowest * patches) * 2.0**lost
 
     @contextmanager
     def waiting(self, worker: Worker, *, patches: int, lost: int) -> Iterator[None]:

@@ -104,7 +104,7 @@ def _attempt(action: Callable[[], RenderedPatches | None]) -> Reply:
     except Exception as error:
         note = f"In a renderer's worker:\n{traceback.format_exc()}"
         try:
-            travelled = pickle.loads(pickle.dumps(error))
+            travelled: Exception = pickle.loads(pickle.dumps(error))
         except Exception:  # of the error's own, or of its arguments
             travelled = RuntimeError(f"{type(error).__name__}: {error}")
         travelled.add_note(note)

@@ -107,9 +107,11 @@ class WorkerRenderer:
             scene_vector, resolution=resolution, samples_per_pixel=samples_per_pixel, seed=seed
         )
 
-    def image_buffers(self, scene_vector: Tensor, *, resolution: int) -> Tensor:
+    def image_buffers(
+        self, scene_vector: Tensor, *, resolution: int, samples: int | None = None
+    ) -> Tensor:
         """See `ngi.render.Renderer.image_buffers`."""
-        return self._local.image_buffers(scene_vector, resolution=resolution)
+        return self._local.image_buffers(scene_vector, resolution=resolution, samples=samples)
 
     def cameras(self, scene_vectors: Tensor) -> Tensor:
         """See `ngi.render.Renderer.cameras`."""

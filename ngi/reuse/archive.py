@@ -95,7 +95,7 @@ class PatchArchive:
     ) -> dict[str, Any]:
         """Writes the patches of these ids, of first … last - 1, and describes the file."""
         name = f"patches-{first:012d}-{last:012d}.pt"
-        compact = store.get_compact(ids)
+        compact = store.get_compact(ids).to("cpu")
         write_tensors(self._folder / name, {"ids": ids, **compact.tensors()})
         return {"name": name, "first": first, "last": last, "checksum": _checksum(ids, compact)}
 

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Self
 
 import torch
 from torch import Tensor
 
-from ngi.patches import BufferLayout, Patches
+from ngi.patches import BufferLayout, Patches, uploaded
+
+ON_DEVICE = ("scene_vector", "world_position", "other_buffers", "log_radiance")
+"""What networks compute with. The host decides by everything else, which stays with it."""
 
 
 @dataclass(frozen=True)
 class CompactPatches:
-    """n patches of which all but the world position is kept in half precision; on the CPU.
+    """n patches of which all but the world position is kept in half precision.
 
     scene_vector: [n, D] float32
     position: [n, 2] float32, patch position
@@ -39,8 +42,13 @@ class CompactPatches:
     log_radiance: Tensor
 
     @classmethod
-    def compress(cls, patches: Patches, layout: BufferLayout) -> Self:
-        """Raises ValueError for buffers of another layout, NaN, Inf and what is above 65,504."""
+    def compress(
+        cls, patches: Patches, layout: BufferLayout, *, device: torch.device | str = "cpu"
+    ) -> Self:
+        """Raises ValueError for buffers of another layout, NaN, Inf and what is above 65,504.
+
+        device: of `ON_DEVICE`; the rest is on the CPU
+        """
         if patches.buffers.shape[-1] != layout.channels:
             raise ValueError(
                 f"buffers: {patches.buffers.shape[-1]} channels: the scene's buffers "
@@ -49,25 +57,30 @@ class CompactPatches:
         world_position = patches.buffers[..., layout.slice("position")]
         other_buffers = patches.buffers[..., layout.slice("position").stop :]
         compact = cls(
-            scene_vector=_keep(patches.scene_vector, torch.float32),
+            scene_vector=_keep(patches.scene_vector, torch.float32, device),
             position=_keep(patches.position, torch.float32),
             resolution=_keep(patches.resolution, torch.int64),
             large_step=_keep(patches.large_step, torch.bool),
-            world_position=_keep(world_position, torch.float32),
-            other_buffers=_keep(other_buffers, torch.float16),
-            log_radiance=_keep(patches.log_radiance, torch.float16),
+            world_position=_keep(world_position, torch.float32, device),
+            other_buffers=_keep(other_buffers, torch.float16, device),
+            log_radiance=_keep(patches.log_radiance, torch.float16, device),
         )
         lengths = {name: len(tensor) for name, tensor in compact.tensors().items()}
         if len(set(lengths.values())) != 1:
             raise ValueError(f"patches of unequal number: {lengths}: give one of each per patch")
-        for name in ("world_position", "other_buffers", "log_radiance"):
-            finite = getattr(compact, name).isfinite().flatten(1).all(1)
+        images = ("world_position", "other_buffers", "log_radiance")
+        found = [getattr(compact, name).isfinite().flatten(1).all(1) for name in images]
+        for name, finite in zip(images, torch.stack(found).cpu(), strict=True):
             if not finite.all():
                 raise ValueError(
                     f"patches {(~finite).nonzero().flatten().tolist()}: {name} holds NaN, Inf or "
                     "numbers above 65504: the renderer must repair or mask such pixels"
                 )
         return compact
+
+    def to(self, device: torch.device | str) -> Self:
+        """With `ON_DEVICE` there."""
+        return replace(self, **{name: uploaded(getattr(self, name), device) for name in ON_DEVICE})
 
     def expand(self) -> Patches:
         """The patches in float32, in memory of their own."""
@@ -83,6 +96,12 @@ class CompactPatches:
 
     def __len__(self) -> int:
         return self.scene_vector.shape[0]
+
+    @property
+    def bytes_on_device(self) -> float:
+        """Of one patch."""
+        tensors = self.tensors()
+        return sum(tensors[name].nbytes for name in ON_DEVICE) / len(self)
 
     def tensors(self) -> dict[str, Tensor]:
         """The fields by name."""
@@ -138,5 +157,5 @@ class PatchBlocks:
         return sum(t.untyped_storage().nbytes() for block in self._blocks for t in block.values())
 
 
-def _keep(tensor: Tensor, dtype: torch.dtype) -> Tensor:
-    return tensor.detach().to(device="cpu", dtype=dtype)
+def _keep(tensor: Tensor, dtype: torch.dtype, device: torch.device | str = "cpu") -> Tensor:
+    return uploaded(tensor.detach().to(dtype), device)

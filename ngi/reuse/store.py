@@ -11,6 +11,7 @@ from torch import Tensor
 from ngi.patches import BufferLayout, Patches
 from ngi.reuse.compact import CompactPatches, PatchBlocks
 from ngi.reuse.drawing import DrawingRule, ProportionalToLoss
+from ngi.reuse.place import place_for
 
 
 class PatchStore:
@@ -20,20 +21,28 @@ class PatchStore:
         not pinned make room
     layout: the buffers of the scene's patches
     rule: which patches are drawn; None for the paper's, in proportion to their last losses
+    device: where they are trained on: a GPU keeps them itself where all of them fit (`place_for`)
 
     Patches are known by their ids, which count up from 0 and are never used again; a stored patch
-    never changes. Everything is kept and given on the CPU, see `CompactPatches` for the precision.
+    never changes. See `CompactPatches` for the precision, and for what is always on the CPU.
     A checkpoint of it is made by `PatchArchive`.
     """
 
     def __init__(
-        self, *, capacity: int, layout: BufferLayout, rule: DrawingRule | None = None
+        self,
+        *,
+        capacity: int,
+        layout: BufferLayout,
+        rule: DrawingRule | None = None,
+        device: str = "cpu",
     ) -> None:
         if capacity < 1:
             raise ValueError(f"capacity: {capacity}: give at least 1, in patches")
         self.capacity = capacity
         self.layout = layout
         self._rule = rule or ProportionalToLoss()
+        self._device = torch.device(device)
+        self._place: torch.device | None = None  # of the patches, from the first one on
         self._waiting = torch.zeros(0, dtype=torch.int64)  # slots, as the rule left them
         self._blocks = PatchBlocks(capacity=capacity)
         self._slots: dict[int, int] = {}  # id -> slot, oldest id first; slots 0 … len - 1 are full
@@ -96,7 +105,9 @@ class PatchStore:
         Raises ValueError, and stores nothing, for patches of another scene or size, for numbers
         half precision cannot hold, and where pinned patches leave no room for n more.
         """
-        compact = CompactPatches.compress(patches, self.layout)
+        compact = self._placed(
+            CompactPatches.compress(patches, self.layout, device=self._place or "cpu")
+        )
         initial_loss = self.mean_loss if self._slots else 1.0
         victims = self._oldest_unpinned(len(self) + len(compact) - self.capacity)
         free = range(len(self), min(len(self) + len(compact), self.capacity))
@@ -211,7 +222,7 @@ class PatchStore:
         slots = {patch_id: slot for slot, patch_id in enumerate(ids)}
         found: set[int] = set()
         for part_ids, compact in parts:
-            blocks.write([slots[patch_id] for patch_id in part_ids.tolist()], compact)
+            blocks.write([slots[i] for i in part_ids.tolist()], self._placed(compact))
             found.update(part_ids.tolist())
         if missing := sorted(slots.keys() - found):
             raise ValueError(f"checkpoint of the store: patches {missing[:16]} are missing")
@@ -227,6 +238,12 @@ class PatchStore:
         self._pinned = frozenset(state["pinned"])
         self._next_id = state["next_id"]
         self._non_finite_losses = state["non_finite_losses"]
+
+    def _placed(self, compact: CompactPatches) -> CompactPatches:
+        """Where the store keeps its patches; the first one's size decides."""
+        if self._place is None and len(compact):
+            self._place = place_for(self.capacity * compact.bytes_on_device, self._device)
+        return compact.to(self._place or "cpu")
 
     def _oldest_unpinned(self, count: int) -> list[int]:
         """Ids of the `count` patches that make room; none where `count` is not positive."""

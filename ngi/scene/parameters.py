@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from ngi.machine.backend import dr, mi
+from ngi.machine.hand_over import overwrite
 from ngi.scene.changes import Changes
 from ngi.scene.jit_variables import aligned
 from ngi.scene.scene_files import SceneFile
@@ -66,7 +66,7 @@ class Parameters:
             matches = [key for key in keys if key.endswith("." + suffix)]
             matches = [key for key in matches if not of or self.owner(key).class_name() in of]
             if matches:
-                found = min(matches, key=lambda key: key.count("."))
+                found: str = min(matches, key=lambda key: key.count("."))
                 self._found.add(found)
                 return found
         varies = f" that varies, as a {' or '.join(of)} has" if of else ""
@@ -135,11 +135,7 @@ class Parameters:
         if mi.variant().startswith("scalar"):
             self.write(key, value)
             return
-        dr.sync_thread()  # until no kernel is running that reads them
-        memory = torch.utils.dlpack.from_dlpack(self._parameters[key])
-        memory.copy_(torch.from_numpy(value))
-        if memory.is_cuda:
-            torch.cuda.synchronize()
+        overwrite(self._parameters[key], value)
         self._parameters.set_dirty(key)
 
     def forget_the_rest(self) -> None:

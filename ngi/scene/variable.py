@@ -139,7 +139,7 @@ class RangedVariable(Variable):
 
     def value(self, components: Values) -> Values:
         """Number by number: minimum + u * (maximum - minimum)."""
-        low, high = np.array(self.minimum), np.array(self.maximum)
+        low, high = (np.array(limits, np.float64) for limits in (self.minimum, self.maximum))
         if self.linked:
             return low + components * (high - low)
         value = low.copy()

@@ -116,7 +116,8 @@ def _renderer(config: DictConfig, folder: Path, *, factor: int) -> Renderer:
     renderer.close()
     with open_dict(chosen):
         chosen.samples_per_pixel = samples
-    return instantiate(chosen)
+    noisier: Renderer = instantiate(chosen)
+    return noisier
 
 
 @hydra.main(version_base="1.3", config_path=str(root() / "conf"), config_name="train")

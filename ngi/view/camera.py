@@ -47,7 +47,8 @@ class Camera:
         end = np.clip(start + along * direction, low[3:], high[3:])
         varied = low != high
         value = np.concatenate([start, end])[varied]
-        return np.clip((value - low[varied]) / (high - low)[varied], 0, 1)
+        components: Vector = np.clip((value - low[varied]) / (high - low)[varied], 0, 1)
+        return components
 
 
 def camera_of(description: SceneDescription) -> Camera | None:

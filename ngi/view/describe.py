@@ -24,6 +24,7 @@ def describe_scene(description: SceneDescription) -> tuple[str, list[str]]:
     """A text about a variable scene, and what is wrong with it."""
     from ngi.render.materials import collect_materials
     from ngi.render.needs import buffer_needs, buffers_are_static, direct_need, needed_layout
+    from ngi.render.sampling_advice import sampling_advice
 
     scene = VariableScene(description)
     lines = [
@@ -41,7 +42,8 @@ def describe_scene(description: SceneDescription) -> tuple[str, list[str]]:
             f"  {numbers:>9}  {names[0]}{f' ({parts})' if parts else ''}: {variable.range}"
         )
     lines += ["", "buffers:"]
-    needs = buffer_needs(scene, collect_materials(scene.bsdfs()))
+    materials = collect_materials(scene.bsdfs())
+    needs = buffer_needs(scene, materials)
     for need in needs:
         lines.append(f"  {need.buffer:>9}  {'kept' if need.needed else 'left out'}: {need.why}")
     direct = direct_need(scene)
@@ -51,6 +53,7 @@ def describe_scene(description: SceneDescription) -> tuple[str, list[str]]:
         lines.append("  no variable changes a buffer: they are rendered once per resolution")
     lines += ["", "geometry:", f"  {_geometry(scene)}"]
     lines += [f"  note: {line}" for line in out_of_bounds(scene)]
+    lines += ["", "sampling:", *(f"  {line}" for line in sampling_advice(scene, materials))]
     return "\n".join(lines), meeting_views(description) or camera_problems(scene)
 
 

@@ -54,7 +54,8 @@ def pack(options: PackOptions) -> None:
     }
     origin: dict[str, Any] = json.loads(result.read_text())
     out.mkdir(parents=True, exist_ok=True)
-    write_atomically(out / "last.ckpt", checkpoint_bytes(content))
+    with checkpoint_bytes(content) as view:
+        write_atomically(out / "last.ckpt", view)
     for name, kept in (
         ("settings.json", settings),
         ("result.json", {key: origin[key] for key in KEPT_OF_RESULT if key in origin}),

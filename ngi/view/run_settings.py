@@ -60,7 +60,8 @@ def made_by(settings: dict[str, Any], group: str) -> Callable[..., Any]:
             f"settings.json: {group}._target_ is '{target}', which no option of the group {group} "
             "names; only what comes with this program is opened"
         )
-    return get_object(target)
+    make: Callable[..., Any] = get_object(target)
+    return make
 
 
 def make_samples(settings: dict[str, Any], renderer: Renderer) -> Samples:

@@ -20,10 +20,11 @@ PASS_SAMPLES = 8
 
 @dataclass(frozen=True)
 class Place:
-    """Where to look: v, and pixels a side."""
+    """Where to look: v, pixels a side, and rays per pixel of the buffers, None for the scene's."""
 
     v: tuple[float, ...]
     resolution: int
+    rays: int | None = None
 
     def tensor(self) -> Tensor:
         """[D]."""
@@ -92,7 +93,7 @@ class SceneView:
 
     def _render_buffers(self) -> Tensor:
         return self.renderer.image_buffers(
-            self.place.tensor(), resolution=self.place.resolution
+            self.place.tensor(), resolution=self.place.resolution, samples=self.place.rays
         ).cpu()
 
     def _trace_pass(self) -> Tensor:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from ngi.view.scene_view import Place
@@ -9,10 +10,6 @@ from ngi.view.screen import Screen
 
 SETTLED = 0.25
 """Seconds without a change after which the full resolution is worth its time."""
-PREVIEW = 4
-"""Factor by which the resolution is lower while something moves."""
-SMALLEST = 64
-"""Pixels a side below which a preview would tell nothing."""
 MOST_SAMPLES = 4096
 """Samples per pixel after which a path-traced picture is left as it is."""
 
@@ -24,12 +21,6 @@ class Wish:
     place: Place
     screen: Screen
 
-    @property
-    def preview(self) -> Wish:
-        """The same at the resolution of a moving picture."""
-        pixels = max(self.place.resolution // PREVIEW, min(SMALLEST, self.place.resolution))
-        return replace(self, place=replace(self.place, resolution=pixels))
-
 
 @dataclass(frozen=True)
 class Job:
@@ -40,12 +31,17 @@ class Job:
 
 
 class Session:
-    """Keeps the newest wish only, so that no backlog of pictures can grow."""
+    """Keeps the newest wish only, so that no backlog of pictures can grow.
 
-    def __init__(self, wish: Wish) -> None:
+    preview: what of a place is shown while something moves; the place itself where it is quick
+    """
+
+    def __init__(self, wish: Wish, preview: Callable[[Place], Place]) -> None:
         self._wish = wish
+        self._preview = preview
         self._changed = -SETTLED
         self._shown: Wish | None = None
+        self._previewed: Wish | None = None
 
     @property
     def wish(self) -> Wish:
@@ -59,7 +55,7 @@ class Session:
 
     def again(self) -> None:
         """What is shown is out of date: the network has changed, or the browser was lost."""
-        self._shown = None
+        self._shown = self._previewed = None
 
     def next_job(self, *, now: float, samples: int) -> Job | None:
         """The picture that is wanted most; None where all is shown.
@@ -71,7 +67,9 @@ class Session:
             return Job(self._wish, more_paths=True) if more else None
         if now - self._changed >= SETTLED:
             return Job(self._wish)
-        return None if self._shown == self._wish.preview else Job(self._wish.preview)
+        if self._previewed == self._wish:
+            return None
+        return Job(replace(self._wish, place=self._preview(self._wish.place)))
 
     def seconds_until_settled(self, *, now: float) -> float:
         """After which `next_job` asks for the full resolution."""
@@ -80,3 +78,4 @@ class Session:
     def done(self, job: Job) -> None:
         """A job's picture is on its way to the browser."""
         self._shown = job.wish
+        self._previewed = self._wish

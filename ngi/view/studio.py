@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from time import monotonic
 
 from ngi.render import Renderer
+from ngi.view.pace import Pace
 from ngi.view.scene_view import Place, Predict, SceneView
 from ngi.view.screen import Pixels
 from ngi.view.session import Job, Session, Wish
@@ -48,6 +49,7 @@ class Studio:
     def __init__(self, *, renderer: Renderer, predict: Predict) -> None:
         self._renderer = renderer
         self._predict = predict
+        self._pace = Pace(renderer.buffer_samples)
         self._sessions: OrderedDict[Hashable, tuple[Session, Show]] = OrderedDict()
         self._views: OrderedDict[Place, SceneView] = OrderedDict()
         self._changed = threading.Condition()
@@ -55,7 +57,7 @@ class Studio:
     def open(self, browser: Hashable, wish: Wish, show: Show) -> None:
         """show: gets every picture for this browser, in the thread that calls `work`."""
         with self._changed:
-            self._sessions[browser] = (Session(wish), show)
+            self._sessions[browser] = (Session(wish, self._pace.preview), show)
             self._changed.notify()
 
     def change(self, browser: Hashable, wish: Wish) -> None:
@@ -101,7 +103,9 @@ class Studio:
         view = self._view(wish.place)
         if turn.job.more_paths:
             view.trace()
-        turn.show(Shown(wish.screen.pixels(view), view, wish, full))
+        pixels = wish.screen.pixels(view)
+        self._pace.measured(view)
+        turn.show(Shown(pixels, view, wish, full))
         return True
 
     def _next(self) -> _Turn | None:

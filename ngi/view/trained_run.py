@@ -13,6 +13,7 @@ from torch import Tensor, nn
 from ngi.evaluate import EvaluationProtocol
 from ngi.files.durable import DamagedError
 from ngi.learn import Samples, network_of, read_checkpoint
+from ngi.machine.captured import Captured, Function
 from ngi.render import Renderer
 from ngi.scene import SceneDescription
 from ngi.view.run_settings import (
@@ -23,6 +24,9 @@ from ngi.view.run_settings import (
     plain,
     read_settings,
 )
+
+RECORDS = "ngi.learn.graph_trainer.GraphTrainer"
+"""The trainer that has a run's steps recorded."""
 
 CHECKPOINTS = ("last.ckpt", "previous.ckpt")
 NETWORK, AVERAGED = "network.", "averaged.module."
@@ -40,6 +44,7 @@ class TrainedRun:
     protocol: that its evaluations measured by
     description: of its scene; None for closed formulas
     samples: what the network was trained on, which says what it is given
+    image: its `render`, as a tuple, recorded as CUDA graphs where the run's steps were
     """
 
     folder: Path
@@ -51,6 +56,7 @@ class TrainedRun:
     renderer: Renderer
     samples: Samples
     network: nn.Module
+    image: Function
 
     @classmethod
     def open(cls, folder: Path, *, scene_path: Path | None = None) -> TrainedRun:
@@ -76,6 +82,7 @@ class TrainedRun:
         network = network_of(samples, make)
         network.load_state_dict(trained_weights(checkpoint["state_dict"]))
         device = "cuda" if torch.cuda.is_available() else "cpu"
+        network = network.to(device).eval()
         return cls(
             folder=folder,
             scene_name=settings["scene"]["name"],
@@ -85,7 +92,8 @@ class TrainedRun:
             description=description,
             renderer=renderer,
             samples=samples,
-            network=network.to(device).eval(),
+            network=network,
+            image=_image(network, recorded=settings["trainer"]["_target_"] == RECORDS),
         )
 
     def predict(self, buffers: Tensor, scene_vector: Tensor) -> Tensor:
@@ -95,13 +103,20 @@ class TrainedRun:
         inputs = self.samples.test_inputs(scene_vector, resolution=len(buffers))
         on_device = (tensor.to(device) for tensor in (buffers, *inputs))
         with torch.autocast(device.type, dtype=torch.bfloat16, enabled=reduced):
-            output: Tensor = self.network.render(*on_device)  # type: ignore[operator]
+            output: Tensor = self.image(*on_device)[0]
         return output.float().cpu()
 
     def radiance(self, scene_vector: Tensor, *, resolution: int) -> Tensor:
         """[H, W, 3]: what the network says of a v of shape [D]; linear RGB, possibly negative."""
         buffers = self.renderer.image_buffers(scene_vector, resolution=resolution)
         return torch.expm1(self.predict(buffers, scene_vector))
+
+
+def _image(network: nn.Module, *, recorded: bool) -> Function:
+    def rendered(*inputs: Tensor) -> tuple[Tensor]:
+        return (network.render(*inputs),)  # type: ignore[operator]
+
+    return Captured(rendered, module=network, name="images") if recorded else rendered
 
 
 def trained_weights(state: dict[str, Tensor]) -> dict[str, Tensor]:

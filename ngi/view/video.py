@@ -168,7 +168,8 @@ def _table(film: Film, measured: Measured) -> str:
     ]
     what = "flicker" if film.stands_still else "temporal error"
     names = (name.replace("_", " ") for name in next(iter(measured.values())))
-    return tabulate(rows, (what, *names), tablefmt="github", disable_numparse=True)
+    table: str = tabulate(rows, (what, *names), tablefmt="github", disable_numparse=True)
+    return table
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

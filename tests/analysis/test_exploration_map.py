@@ -8,6 +8,7 @@ import pytest
 from analysis.exploration_map import heat_maps, tables
 from analysis.exploration_map import speedup as speedup_module
 from analysis.exploration_map.__main__ import main, write_map
+from analysis.exploration_map.final_errors import main as final_errors_main
 from analysis.exploration_map.heat_maps import cell_text
 from analysis.exploration_map.runs import (
     BASE,
@@ -224,3 +225,30 @@ def test_what_is_not_there_is_said(tmp_path: Path, capsys: pytest.CaptureFixture
     rows_of({"uniform": 1.0}).drop(columns="noise").to_csv(tmp_path / "exploration_map.csv")
     with pytest.raises(ValueError, match="it lacks \\['noise'\\]"):
         read_table(tmp_path)
+
+
+def test_final_errors_are_those_of_the_last_step_paired_by_seed(tmp_path: Path) -> None:
+    """Seed 1 has ten times the error of seed 0 with both samplers: half as much in each pair."""
+    rows = rows_of({"uniform": 0.004, "predicted": 0.004})
+    rows.loc[rows["sampler"] == "predicted", "error_tail"] *= 0.5
+    rows.loc[rows["seed"] == 1, "error_tail"] *= 10
+    rows["lit"] = 0.25
+    rows[rows["reuse"]].to_csv(tmp_path / "exploration_map.csv", index=False)
+    assert final_errors_main([str(tmp_path), "--output", str(tmp_path / "final.md")]) == 0
+    uniform, predicted = (tmp_path / "final.md").read_text().splitlines()[-2:]
+    last = math.exp(-4.0) * 5.5
+    assert [cell.strip() for cell in uniform.split("|")[1:7]] == [
+        *("base", "1000", "yes", "uniform", "2", "0.250 ± 0.000")
+    ]
+    assert f" {last:.3f} ± " in uniform
+    assert f" {last / 2:.4f} ± " in predicted
+    assert "-50.0 ± 0.0 %" in predicted
+    assert uniform.split("|")[-2].strip() == ""
+    half = math.log(2) / 0.004  # steps to half of the error
+    expected = 990 / (990 - half) * 6 / 6.6
+    assert float(predicted.split("|")[-3]) == pytest.approx(expected, abs=0.06)
+
+
+def test_final_errors_of_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert final_errors_main([str(tmp_path), "--output", str(tmp_path / "final.md")]) == 1
+    assert "there is no such file" in capsys.readouterr().err

@@ -1,5 +1,6 @@
 """README.md and docs/learner show the numbers of docs/learner/results.csv."""
 
+import json
 from pathlib import Path
 
 import pandas as pd
@@ -9,13 +10,16 @@ from analysis.learner_table import (
     ABLATION,
     BEGIN,
     END,
+    FRAMES,
     PAGES,
     RESULTS,
     learner_table,
     parts_table,
+    with_frames,
     with_parts,
     written,
 )
+from analysis.parts_of_frames import frames_table
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -33,6 +37,35 @@ def test_the_page_has_the_numbers_of_the_ablation() -> None:
     assert text == with_parts(text, pd.read_csv(ROOT / ABLATION)), (
         "python -m analysis.learner_table writes it"
     )
+
+
+def test_the_page_has_the_times_of_the_benchmark() -> None:
+    text = (ROOT / "docs/learner/README.md").read_text()
+    assert text == with_frames(text, json.loads((ROOT / FRAMES).read_text())), (
+        "python -m analysis.learner_table writes it"
+    )
+
+
+def frame_figure(name: str, median: float, *, scene: str = "box", part: str = "frames") -> dict:
+    return {"name": name, "median": median, "scene": scene, "part": part, "unit": "ms"}
+
+
+def test_frames_have_a_row_per_scene_and_resolution() -> None:
+    figures = [
+        frame_figure("rays, all of them, 96 × 96", 1234.4),
+        frame_figure("ours / paths and denoiser, 96 × 96", 0.456),
+        frame_figure("rays, all of them, 256 × 256", 2.5),
+        frame_figure("ours / paths and denoiser, 256 × 256", 1.0),
+        frame_figure("step, 8x512", 1.0, part="training"),
+    ]
+    assert frames_table(figures).splitlines() == [
+        "| scene | pixels | rays, all of them | ours / paths and denoiser |",
+        "| :-- | --: | --: | --: |",
+        "| box | 96 × 96 | 1,234 | 0.46 |",
+        "| box | 256 × 256 | 2 | 1.00 |",
+    ]
+    with pytest.raises(ValueError, match="box, 256 pixels: 'ours / paths and denoiser' was not"):
+        frames_table(figures[:3])
 
 
 def test_parts_are_compared_with_the_whole_that_they_belong_to() -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -11,19 +9,7 @@ from hydra.errors import HydraException
 
 from ngi.config.configuration import composed
 from ngi.config.hydra_program import explained
-from tests.learn.command_line import SMALL, environment, run
-
-
-def started(module: str, *words: str, folder: Path) -> tuple[int, str]:
-    done = subprocess.run(
-        [sys.executable, "-m", module, *words],
-        cwd=folder,
-        env=environment(folder),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    )
-    return done.returncode, done.stdout
+from tests.learn.command_line import SMALL, run, run_module
 
 
 @pytest.mark.parametrize(
@@ -63,7 +49,7 @@ def test_of_what_does_not_exist_the_nearest_is_named(word: str, message: str) ->
 @pytest.mark.parametrize("module", ["ngi.train", "ngi.commands.costs", "ngi.studies.noise"])
 def test_a_mistyped_key_is_said_in_one_line_and_leaves_nothing(module: str, tmp_path: Path) -> None:
     words = ("renderer=analytic", "budget=smoke", "model.hidden_feature=64")
-    status, output = started(module, *words, folder=tmp_path)
+    status, output = run_module(module, *words, folder=tmp_path)
     assert status == 1
     assert output == (
         "model.hidden_feature: there is no such key; did you mean 'model.hidden_features'?\n"
@@ -96,7 +82,7 @@ def test_an_error_of_a_run_is_said_once_and_kept_where_the_run_is(
 
 
 def test_an_error_of_what_is_measured_is_said_once(tmp_path: Path) -> None:
-    status, output = started("ngi.commands.costs", *SMALL, "seed=maybe", folder=tmp_path)
+    status, output = run_module("ngi.commands.costs", *SMALL, "seed=maybe", folder=tmp_path)
     assert status == 1
     assert output.count("seed: 'maybe' is not an integer") == 1
 

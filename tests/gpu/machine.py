@@ -11,9 +11,22 @@ import torch
 from torch import Tensor
 from torch.nn.utils import clip_grad
 
+from ngi.patches import uploaded
 from ngi.render.closed_form import ClosedFormRenderer
 from ngi.render.protocol import RenderedPatches
-from tests.gpu.pretended import CPU, DEVICE, LEDGER, Gpu, Ledger, OnGpu, moved, on, waited
+from tests.gpu.pretended import (
+    CPU,
+    DEVICE,
+    LEDGER,
+    Gpu,
+    Ledger,
+    OnGpu,
+    moved,
+    on,
+    pinned,
+    waited,
+)
+from tests.gpu.pretended_graphs import GRAPHS
 
 NAME = "NVIDIA Pretended"
 
@@ -36,6 +49,7 @@ PROBES: dict[str, Callable[..., Any]] = {
     "synchronize": lambda *_: waited(),
     "get_rng_state_all": list,
     "set_rng_state_all": lambda *_: None,
+    **GRAPHS,
 }
 """What is asked of `torch.cuda` in a run, by the program and by Lightning."""
 
@@ -68,14 +82,14 @@ def _patch_moves(monkeypatch: pytest.MonkeyPatch) -> None:
     def to_device(self: Tensor, *args: Any, **kwargs: Any) -> Tensor:
         if args and isinstance(args[0], Tensor):
             args = (args[0].device, args[0].dtype, *args[1:])
-        device, dtype, *_ = torch._C._nn._parse_to(
+        device, dtype, non_blocking, *_ = torch._C._nn._parse_to(
             *args, **{k: v for k, v in kwargs.items() if k not in ("copy", "memory_format")}
         )
         if device is None or (device.type == "cuda") == on(self):
             kwargs.pop("device", None)
             rest = [a for a in args if not isinstance(a, str | torch.device)]
             return to(self, *rest, **kwargs) if rest or kwargs else self
-        return moved(self, device.type == "cuda", dtype or self.dtype)
+        return moved(self, device.type == "cuda", dtype or self.dtype, waits=not non_blocking)
 
     def to_numpy(self: Tensor, *, force: bool = False) -> Any:
         if not on(self):
@@ -87,6 +101,7 @@ def _patch_moves(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Tensor, "to", to_device)
     monkeypatch.setattr(Tensor, "cpu", lambda self: to_device(self, CPU))
     monkeypatch.setattr(Tensor, "cuda", lambda self, *_: to_device(self, DEVICE))
+    monkeypatch.setattr(Tensor, "pin_memory", lambda self: pinned(self))
     monkeypatch.setattr(Tensor, "numpy", to_numpy)
     monkeypatch.setattr(Tensor, "tolist", lambda self: tolist(to_device(self.detach(), CPU)))
     monkeypatch.setattr(OnGpu, "data_ptr", lambda self: self.numbers.data_ptr())
@@ -127,7 +142,9 @@ def _patch_renderers(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def patches_on_gpu(self: ClosedFormRenderer, states: Tensor, **how: Any) -> RenderedPatches:
         rendered = render_patches(self, states, **how)
-        buffers, log_radiance = rendered.buffers.to(DEVICE), rendered.log_radiance.to(DEVICE)
+        buffers, log_radiance = (
+            uploaded(images, DEVICE) for images in (rendered.buffers, rendered.log_radiance)
+        )
         return replace(rendered, buffers=buffers, log_radiance=log_radiance)
 
     def on_gpu(render: Callable[..., Tensor]) -> Callable[..., Tensor]:

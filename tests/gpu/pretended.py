@@ -93,6 +93,7 @@ class Ledger:
     """
 
     waits: Counter[str] = field(default_factory=Counter)
+    waited: int = 0  # since the program began, however often it is cleared
     uploads: Counter[str] = field(default_factory=Counter)
     launches: Counter[str] = field(default_factory=Counter)
 
@@ -102,6 +103,9 @@ class Ledger:
 
 
 LEDGER = Ledger()
+
+TAPE: list[list[Any]] = []
+"""Of the graph that is being captured, if any: what is launched, with its operands."""
 
 
 def caller() -> str:
@@ -151,18 +155,21 @@ def computed(operator: Any, args: Any, kwargs: dict[str, Any]) -> Any:
     packet = operator.overloadpacket
     if packet in MIXED:
         on_gpu = isinstance(tree_leaves(args)[0], OnGpu)
-        _note_copy(args)
+        _note_copy(args, waits=not ((args[2:] and args[2]) or kwargs.get("non_blocking")))
     check_devices(operator, args, kwargs)
     in_backward = torch._C._current_graph_task_id() != -1  # where C++ asks for its own device
     if (device := kwargs.get("device")) is not None:
         on_gpu = torch.device(device).type == "cuda" or (in_backward and on_gpu)
         kwargs = {**kwargs, "device": CPU}
         if packet is aten._to_copy:
-            _note_move(args[0], on_gpu)
+            _note_move(args[0], on_gpu, waits=not kwargs.get("non_blocking"))
     if on_gpu:
         _note(operator, args)
     plain_args, plain_kwargs = tree_map(plain, (args, kwargs))
     result = operator(*plain_args, **plain_kwargs)
+    if on_gpu and not is_view(operator):
+        for tape in TAPE:
+            tape.append((operator, plain_args, plain_kwargs, result))
     if not on_gpu:
         return result.as_subclass(_Zeros) if packet is aten.zeros and in_backward else result
     result = tree_map_only(Tensor, OnGpu, result)
@@ -178,23 +185,37 @@ def _note(operator: Any, args: Any) -> None:
             for index in args[1]
         )
     ):
-        LEDGER.waits[caller()] += 1
+        waited()
     if not is_view(operator):
         LEDGER.launches[str(operator)] += 1
 
 
-def _note_copy(args: Any) -> None:
+def _note_copy(args: Any, *, waits: bool) -> None:
     for into, source in zip(tree_leaves(args[0]), tree_leaves(args[1]), strict=True):
         if isinstance(source, Tensor):
-            _note_move(source, on(into), was=on(source))
+            _note_move(source, on(into), waits=waits)
 
 
-def _note_move(source: Tensor, to_gpu: bool, was: bool | None = None) -> None:
-    was = on(source) if was is None else was
+def _note_move(source: Tensor, to_gpu: bool, *, waits: bool) -> None:
+    """waits: the caller has not said `non_blocking`. From memory that is not pinned that is so."""
+    was = on(source)
     if was and not to_gpu:
-        LEDGER.waits[caller()] += 1
+        waited()
     elif to_gpu and not was:
         LEDGER.uploads[caller()] += 1
+        if waits or not is_pinned(source) or TAPE:
+            waited()
+
+
+def pinned(tensor: Tensor) -> Tensor:
+    """A copy that a GPU can read while the host goes on."""
+    copy = tensor.clone()
+    copy.pinned_for_gpu = True  # type: ignore[attr-defined]
+    return copy
+
+
+def is_pinned(tensor: Tensor) -> bool:
+    return getattr(tensor, "pinned_for_gpu", False)
 
 
 def on(tensor: Tensor) -> bool:
@@ -218,23 +239,28 @@ class _Moved(torch.autograd.Function):
     """Between the devices, with the gradient going back."""
 
     @staticmethod
-    def forward(ctx: Any, tensor: Tensor, to_gpu: bool, dtype: torch.dtype) -> Tensor:
+    def forward(ctx: Any, tensor: Tensor, to_gpu: bool, dtype: torch.dtype, waits: bool) -> Tensor:
         ctx.was = on(tensor), tensor.dtype
-        _note_move(tensor, to_gpu)
+        _note_move(tensor, to_gpu, waits=waits)
         numbers = plain(tensor.detach()).to(dtype, copy=True)
         return OnGpu(numbers) if to_gpu else numbers
 
     @staticmethod
-    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, None, None]:  # type: ignore[override]
-        return moved(gradient, *ctx.was), None, None
+    def backward(  # type: ignore[override]
+        ctx: Any, gradient: Tensor
+    ) -> tuple[Tensor, None, None, None]:
+        return moved(gradient, *ctx.was), None, None, None
 
 
-def moved(tensor: Tensor, to_gpu: bool, dtype: torch.dtype) -> Tensor:
+def moved(tensor: Tensor, to_gpu: bool, dtype: torch.dtype, *, waits: bool = True) -> Tensor:
     """`tensor.to` for another device."""
-    result: Tensor = _Moved.apply(tensor, to_gpu, dtype)  # type: ignore[no-untyped-call]
+    result: Tensor = _Moved.apply(tensor, to_gpu, dtype, waits)  # type: ignore[no-untyped-call]
     return result if tensor.requires_grad else result.detach()
 
 
 def waited() -> None:
     """The host waits for the device."""
+    if TAPE:
+        raise RuntimeError("CUDA error: operation not permitted when stream is capturing")
     LEDGER.waits[caller()] += 1
+    LEDGER.waited += 1

@@ -55,9 +55,16 @@ def test_the_host_waits_where_it_asks_for_numbers(gpu: Ledger) -> None:
         gpu.clear()
         ask()
         assert gpu.waits.total() == 1
-    gpu.clear()
-    torch.ones(3).to("cuda")
-    assert (gpu.waits.total(), gpu.uploads.total()) == (0, 1)
+    for upload, waits in (
+        (lambda x: x.to("cuda"), 1),
+        (lambda x: x.to("cuda", non_blocking=True), 1),  # the system may move its memory
+        (lambda x: x.pin_memory().to("cuda", non_blocking=True), 0),
+        (lambda x: torch.zeros(3, device="cuda").copy_(x.pin_memory(), non_blocking=True), 0),
+        (lambda x: torch.tensor(x.tolist(), device="cuda"), 1),
+    ):
+        gpu.clear()
+        upload(torch.ones(3))
+        assert (gpu.waits.total(), gpu.uploads.total()) == (waits, 1)
 
 
 @pytest.mark.usefixtures("gpu")

@@ -1,6 +1,8 @@
 """How often the host waits for the GPU in a training step, and where."""
 
 from collections import Counter
+from contextlib import nullcontext
+from dataclasses import replace
 from functools import partial
 from itertools import islice
 from pathlib import Path
@@ -10,6 +12,7 @@ import torch
 
 from ngi.explore import Loss, LossTimesOutputGradient, LossTimesStep, Target
 from ngi.learn import IlluminationModule, StepGuard, patch_example, seeded, training_step
+from ngi.learn.captured_pass import CapturedPass
 from ngi.models import L1Dssim, MuonAdam, PixelGenerator, exponential_average
 from ngi.render import AnalyticRenderer
 from tests.gpu.pretended import Ledger
@@ -19,10 +22,13 @@ OPTIMIZERS = {"adam": partial(torch.optim.Adam, lr=1e-3), "muon": MuonAdam}
 
 
 def waits(
-    folder: Path, ledger: Ledger, target: Target, optimizer_name: str
+    folder: Path, ledger: Ledger, target: Target, optimizer_name: str, *, recorded: bool
 ) -> dict[bool, list[Counter[str]]]:
-    """By file, in each step after the first four; of generated batches and of stored ones."""
-    stream = make(folder, target=target)
+    """By file, in each step after the first four; of generated batches and of stored ones.
+
+    The batch that a step is taken on is made in it too.
+    """
+    stream = make(folder, target=target, device="cuda")
     module = IlluminationModule(
         network=seeded(PixelGenerator, seed=0)(
             layout=AnalyticRenderer(dimensions=3, patch_size=8).layout,
@@ -37,24 +43,40 @@ def waits(
         guard=StepGuard(stream=stream, folder=folder),
         averaging=partial(exponential_average, decay=0.9),
     ).to("cuda")
+    learner = module.learner
+    if recorded:
+        captured = CapturedPass(module.network, module.loss, precision=nullcontext)
+        learner = replace(learner, captured=captured)
     optimizer = module.configure_optimizers()
     found: dict[bool, list[Counter[str]]] = {True: [], False: []}
     for number, batch in enumerate(islice(stream, 16)):
-        ledger.clear()
-        training_step(batch.to("cuda"), module.learner, optimizer=optimizer)
+        training_step(batch.to("cuda"), learner, optimizer=optimizer)
         if number >= 4:
             files = Counter[str]()
             for place, count in ledger.waits.items():
                 files[place.partition(":")[0]] += count
             found[batch.generated].append(files)
+            assert batch.generated or not ledger.uploads
+        ledger.clear()
     return found
 
 
-@pytest.mark.parametrize("optimizer", OPTIMIZERS)
-@pytest.mark.parametrize("target", [Loss(), LossTimesStep(), LossTimesOutputGradient()])
-def test_a_step_waits_once(gpu: Ledger, tmp_path: Path, target: Target, optimizer: str) -> None:
-    found = waits(tmp_path, gpu, target, optimizer)
+TARGETS = (Loss(), LossTimesStep(), LossTimesOutputGradient())
+CASES = [
+    *((target, optimizer, False) for target in TARGETS for optimizer in OPTIMIZERS),
+    (Loss(), "adam", True),
+    (LossTimesStep(), "muon", True),
+]
+
+
+@pytest.mark.parametrize(("target", "optimizer", "recorded"), CASES)
+def test_a_step_waits_once(
+    gpu: Ledger, tmp_path: Path, target: Target, optimizer: str, recorded: bool
+) -> None:
+    found = waits(tmp_path, gpu, target, optimizer, recorded=recorded)
     assert found[True]
     assert found[False]
-    for files in (*found[True], *found[False]):
+    for files in found[False]:
         assert files == {"learn/reading.py": 1}
+    for files in found[True]:  # whether patches are finite, traced and in half precision
+        assert files == {"learn/reading.py": 2, "reuse/compact.py": 1}

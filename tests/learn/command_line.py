@@ -3,9 +3,11 @@
 import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import ngi
+from tests import warm
 
 CHECKOUT = Path(ngi.__file__).parents[1]
 """Of the program that the other tests import, wherever another one is installed."""
@@ -54,7 +56,22 @@ def start(
 def run(
     folder: Path, *overrides: str, options: tuple[str, ...] = (), base: tuple[str, ...] = SMALL
 ) -> tuple[int, str]:
-    """Exit status and everything printed."""
-    process = start(folder, *overrides, options=options, base=base)
+    """Exit status and everything printed, by a process that need not import everything first."""
+    return run_module("ngi.train", *options, *base, *overrides, folder=folder)
+
+
+def run_cold(folder: Path, *overrides: str, options: tuple[str, ...] = ()) -> tuple[int, str]:
+    """The same by a process of its own, as launchers need it, whose processes have it as parent."""
+    process = start(folder, *overrides, options=options)
     output, _ = process.communicate(timeout=300)
     return process.returncode, output
+
+
+def run_module(module: str, *words: str, folder: Path) -> tuple[int, str]:
+    """`python -m MODULE WORDS` in `folder`: exit status and everything printed."""
+    with tempfile.TemporaryDirectory() as elsewhere:
+        output = Path(elsewhere) / "output"
+        started = warm.start_module(
+            module, *words, folder=folder, environment=environment(folder), output=output
+        )
+        return warm.finish(started, output, seconds=300)

@@ -5,28 +5,19 @@ They can be killed, stopped and starved as any other; a command line takes secon
 
 import copy
 import logging
-import multiprocessing
-import os
-import sys
-import threading
 from collections.abc import Callable
 from functools import cache
-from multiprocessing import forkserver
 from multiprocessing.context import ForkServerProcess
 from pathlib import Path
 from typing import Any
-from unittest import mock
 
 import torch
 from omegaconf import DictConfig, OmegaConf
-from tqdm import tqdm
 
 from ngi.train import train
+from tests import warm
 from tests.learn.command_line import SIZE
 from tests.learn.composition import run_config
-
-CONTEXT = multiprocessing.get_context("forkserver")
-PRELOADED = ["pytest", "ngi.learn", "matplotlib.pyplot", "torch._dynamo", __name__]
 
 
 @cache
@@ -61,10 +52,7 @@ def start(
 
     first: called in that process before it trains
     """
-    CONTEXT.set_forkserver_preload(PRELOADED)
-    with mock.patch.dict(os.environ, PYTHONPATH=os.pathsep.join(sys.path), OMP_NUM_THREADS="1"):
-        forkserver.ensure_running()
-    process = CONTEXT.Process(target=_work, args=(config, output, first))
+    process = warm.process(_work, config, output, first)
     process.start()
     return process
 
@@ -73,21 +61,14 @@ def run(
     config: DictConfig, output: Path, *, first: Callable[[], Any] | None = None
 ) -> tuple[int, str]:
     """Exit status, and everything printed by this and earlier runs with the same `output`."""
-    process = start(config, output, first=first)
-    process.join(timeout=120)
-    if process.exitcode is None:
-        process.kill()
-        raise TimeoutError(output.read_text())
-    return process.exitcode, output.read_text()
+    return warm.finish(start(config, output, first=first), output, seconds=120)
 
 
 def _work(config: DictConfig, output: Path, first: Callable[[], Any] | None) -> None:
-    with output.open("a") as stream:
-        for descriptor in (1, 2):
-            os.dup2(stream.fileno(), descriptor)
+    warm.print_to(output)
     logging.basicConfig(level=logging.INFO, format="%(message)s", force=True)
     torch.set_num_threads(1)
-    tqdm.set_lock(threading.RLock())  # its own is a semaphore that a killed process leaves behind
+    warm.without_semaphores()
     if first is not None:
         first()
     train(config)

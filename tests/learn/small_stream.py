@@ -43,12 +43,14 @@ def make(
     capacity: int = 64,
     seed: int = 0,
     renderer: AnalyticRenderer | PocketRenderer | None = None,
+    halves: bool = False,
     when_late: str = "wait",
     clock: PhaseClock | None = None,
+    device: str = "cpu",
 ) -> TrainingStream:
     renderer = renderer or AnalyticRenderer(dimensions=3, patch_size=8)
     return TrainingStream(
-        samples=PatchSamples(renderer=renderer),
+        samples=PatchSamples(renderer=renderer, halves=halves),
         sampler=sampler
         or MarkovChains(
             chains=CHAINS,
@@ -58,7 +60,7 @@ def make(
             acceptance=Greedy(accept_equal=False) if greedy else Always(),
         ),
         reuse=Reuse(
-            store=PatchStore(capacity=capacity, layout=renderer.layout, rule=rule),
+            store=PatchStore(capacity=capacity, layout=renderer.layout, rule=rule, device=device),
             archive=PatchArchive(folder),
             policy=policy or FixedProbability(bootstrap_batches=3, probability=0.5),
             when_late=when_late,

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.learn.command_line import run
+from tests.learn.command_line import run, run_cold
 
 
 @pytest.mark.parametrize("launcher", ["basic", "joblib", "submitit_local"])
@@ -11,18 +11,13 @@ def test_one_failing_job_does_not_lose_the_others(tmp_path: Path, launcher: str)
     if launcher != "basic":
         plugin = launcher.partition("_")[0]
         pytest.importorskip(f"hydra_plugins.hydra_{plugin}_launcher", reason="an extra is missing")
-    status, output = run(
-        tmp_path,
-        "optimizer.lr=-1,1e-3",
-        "seed=0,1",
-        f"hydra/launcher={launcher}",
-        options=("--multirun",),
+    status, output = run_cold(
+        tmp_path, "optimizer.lr=-1,1e-3", f"hydra/launcher={launcher}", options=("--multirun",)
     )
     assert status != 0
     assert "Invalid learning rate" in output
     results = [json.loads(r.read_text()) for r in (tmp_path / "outputs").rglob("result.json")]
-    assert sorted(r["seed"] for r in results) == [0, 1]
-    assert {r["config"]["optimizer"]["lr"] for r in results} == {0.001}
+    assert [r["config"]["optimizer"]["lr"] for r in results] == [0.001]
 
 
 def test_weights_and_biases_runs_offline_and_stay_apart(tmp_path: Path) -> None:

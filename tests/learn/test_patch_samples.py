@@ -48,6 +48,23 @@ def test_targets_are_the_mean_of_traced_and_denoised_radiance(share) -> None:
     assert result.paths == plain.paths
 
 
+def test_of_a_denoised_patch_only_the_traced_share_is_noise() -> None:
+    """What is left of (a - b) / 2 where the mean is half traced."""
+    renderer = AnalyticRenderer(dimensions=3, patch_size=16, noise=0.3)
+    halves, both = (
+        PatchSamples(renderer=renderer, denoiser=denoiser, traced_share=0.5, halves=True)
+        .start_patches(states(renderer), resolution=64, seed=1)
+        .result()
+        for denoiser in (None, Halving())
+    )
+    assert halves.first_half is not None
+    assert both.first_half is not None
+    noise = halves.first_half.expm1() - halves.log_radiance.expm1()
+    left = both.first_half.expm1() - both.log_radiance.expm1()
+    torch.testing.assert_close(left, noise / 2, atol=1e-5, rtol=1e-4)
+    assert noise.abs().mean() > 0.01
+
+
 def test_negative_radiance_of_a_denoiser_is_none() -> None:
     renderer = AnalyticRenderer(dimensions=1, patch_size=16)
     traced = renderer.render_patches(states(renderer), resolution=64, seed=1)

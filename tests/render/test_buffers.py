@@ -122,3 +122,18 @@ def test_box_filter_averages_over_the_pixel(load_box) -> None:
     difference = (image - mean)[..., linear].abs()
     assert difference.max() < 0.1
     assert difference.mean() < 0.003
+
+
+@pytest.mark.parametrize("backend", ["llvm", "scalar"])
+def test_fewer_rays_than_usual_are_those_of_a_renderer_that_has_as_few(load_box, backend) -> None:
+    usual, few = (load_box(backend, buffer_samples=n, patch_size=16) for n in (2, 1))
+    fewer = usual.image_buffers(V, resolution=16, samples=1)
+    assert torch.equal(fewer, few.image_buffers(V, resolution=16))
+    whole = usual.image_buffers(V, resolution=16)
+    assert not torch.equal(fewer, whole)
+    assert torch.equal(whole, usual.image_buffers(V, resolution=16, samples=2))
+
+
+def test_no_rays_at_all_are_refused(load_box) -> None:
+    with pytest.raises(ValueError, match="samples"):
+        load_box("llvm", buffer_samples=1, patch_size=16).image_buffers(V, resolution=16, samples=0)

@@ -144,11 +144,11 @@ def test_buffers_of_an_image_are_the_same_in_bands(load_box, monkeypatch) -> Non
     renderer = load_box("llvm", buffer_samples=4, patch_size=16)
     whole = renderer.image_buffers(V, resolution=16)
     windows = []
-    buffers = renderer._image_tracer.buffers
+    buffers = renderer._tracer.buffers
     monkeypatch.setattr(
-        renderer._image_tracer,
+        renderer._tracer,
         "buffers",
-        lambda window: (windows.append(window), buffers(window))[1],
+        lambda window, samples: (windows.append(window), buffers(window, samples=samples))[1],
     )
     monkeypatch.setattr("ngi.render.launches.PATHS_PER_LAUNCH", 4 * 16 * 5)
     torch.testing.assert_close(renderer.image_buffers(V, resolution=16), whole)
@@ -158,7 +158,7 @@ def test_buffers_of_an_image_are_the_same_in_bands(load_box, monkeypatch) -> Non
 def test_pixels_of_an_image_that_are_not_finite_stay_so(load_box, monkeypatch) -> None:
     renderer = load_box("llvm", buffer_samples=1, patch_size=16)
     clean = renderer.render_image(V, resolution=16, samples_per_pixel=8, seed=0)
-    radiance = renderer._image_tracer.radiance
+    radiance = renderer._tracer.radiance
     calls = []
 
     def broken(window, **arguments):
@@ -168,7 +168,7 @@ def test_pixels_of_an_image_that_are_not_finite_stay_so(load_box, monkeypatch) -
         image[5, 6] = np.inf
         return lambda: image
 
-    monkeypatch.setattr(renderer._image_tracer, "radiance", broken)
+    monkeypatch.setattr(renderer._tracer, "radiance", broken)
     image = renderer.render_image(V, resolution=16, samples_per_pixel=8, seed=0)
     assert len(calls) == 1
     assert (~image.isfinite()).nonzero().tolist() == [[3, 4, 1], *([5, 6, i] for i in range(3))]
@@ -206,7 +206,7 @@ def test_many_samples_are_traced_in_passes_that_weigh_by_their_samples(
         image = torch.full((window.height, window.width, 3), float(len(passes)))
         return lambda: image
 
-    monkeypatch.setattr(renderer._patch_tracer, "radiance", numbered)
+    monkeypatch.setattr(renderer._tracer, "radiance", numbered)
     patches = renderer.render_patches(states(1), resolution=40, seed=0)
     assert list(passes.values()) == [3, 3, 2]
     mean = (3 * 1 + 3 * 2 + 2 * 3) / 8
@@ -217,7 +217,7 @@ def test_many_samples_are_traced_in_passes_that_weigh_by_their_samples(
 @pytest.mark.parametrize(("bad_attempts", "masked"), [(1, 0), (2, 1)])
 def test_pixels_that_are_not_finite(load_box, monkeypatch, bad_attempts, masked) -> None:
     renderer = load_box("llvm", buffer_samples=1, patch_size=16)
-    radiance = renderer._patch_tracer.radiance
+    radiance = renderer._tracer.radiance
     calls = []
 
     def broken(window, **arguments):
@@ -227,13 +227,37 @@ def test_pixels_that_are_not_finite(load_box, monkeypatch, bad_attempts, masked)
             image[3, 4, 1] = np.nan
         return lambda: image
 
-    monkeypatch.setattr(renderer._patch_tracer, "radiance", broken)
+    monkeypatch.setattr(renderer._tracer, "radiance", broken)
     patches = renderer.render_patches(states(1), resolution=40, seed=0)
     assert (patches.repaired, patches.masked) == (1, masked)
     assert patches.paths == 2 * 16 * 16 * 8
     assert len(set(calls)) == 2
     assert torch.isfinite(patches.log_radiance).all()
     assert bool((patches.log_radiance[0, 3, 4] == 0).all()) == bool(masked)
+
+
+def test_only_the_patch_that_is_not_finite_is_rendered_again(load_box, monkeypatch) -> None:
+    renderer = load_box("llvm", buffer_samples=1, patch_size=16)
+    whole = renderer.render_patches(states(4), resolution=40, seed=0)
+    radiance = renderer._tracer.radiance
+    seeds = []
+
+    def broken(window, *, samples, seed):
+        seeds.append(seed)
+        image = radiance(window, samples=samples, seed=seed)().clone()
+        if len(seeds) == 3:
+            image[0, 0, 0] = np.inf
+        return lambda: image
+
+    monkeypatch.setattr(renderer._tracer, "radiance", broken)
+    patches = renderer.render_patches(states(4), resolution=40, seed=0)
+    assert (patches.repaired, patches.masked, len(set(seeds))) == (1, 0, 5)
+    same = [
+        torch.equal(a, b) for a, b in zip(patches.log_radiance, whole.log_radiance, strict=True)
+    ]
+    assert same == [True, True, False, True]
+    assert torch.isfinite(patches.log_radiance).all()
+    assert torch.equal(patches.buffers, whole.buffers)
 
 
 @pytest.mark.parametrize("backend", ["llvm", "scalar"])

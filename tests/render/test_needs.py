@@ -121,9 +121,11 @@ def test_same_patches_as_with_everything(scene, backend, monkeypatch) -> None:
     states = torch.rand(3, 3, generator=torch.Generator().manual_seed(1))
     expected = everything.render_patches(states, resolution=20, seed=4)
     traced = []
-    buffers = needed._image_tracer.buffers
+    buffers = needed._tracer.buffers
     monkeypatch.setattr(
-        needed._image_tracer, "buffers", lambda window: (traced.append(window), buffers(window))[1]
+        needed._tracer,
+        "buffers",
+        lambda window, samples: (traced.append(window), buffers(window, samples=samples))[1],
     )
     for _ in range(2):
         patches = needed.render_patches(states, resolution=20, seed=4)

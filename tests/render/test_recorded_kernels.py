@@ -9,6 +9,7 @@ import torch
 from PIL import Image
 
 from ngi.machine.backend import dr, llvm_problem
+from ngi.render.first_hit import FirstHit
 from ngi.render.mitsuba_renderer import MitsubaRenderer
 from ngi.scene import read_scene
 from ngi.studies.benchmark.measure import counted_compilations
@@ -64,6 +65,27 @@ def test_a_textured_emitter_is_recorded(renderer_of_a_screen, caplog) -> None:
     torch.testing.assert_close(mean, image, atol=0.02, rtol=0.1)
 
 
+def test_python_traces_each_size_of_an_image_once(renderer_of_a_screen, monkeypatch) -> None:
+    traced, channels = [], FirstHit.channels
+
+    def counted(*arguments):
+        traced.append(arguments)
+        return channels(*arguments)
+
+    monkeypatch.setattr(FirstHit, "channels", counted)
+    renderer = renderer_of_a_screen()
+    sizes = [(8, 16), (16, 16), (16, 4)]
+    images = [
+        [renderer.image_buffers(torch.tensor([v]), resolution=n, samples=rays) for n, rays in sizes]
+        for v in (0.2, 0.8, 0.5)
+    ]
+    assert len(traced) == len(sizes)
+    for image, (n, rays) in zip(images[-1], sizes, strict=True):
+        fresh = renderer_of_a_screen()  # which traces this alone
+        expected = fresh.image_buffers(torch.tensor([0.5]), resolution=n, samples=rays)
+        assert torch.equal(image, expected)
+
+
 def test_what_cannot_be_recorded_is_traced_each_time(
     renderer_of_a_screen, caplog, monkeypatch
 ) -> None:
@@ -77,7 +99,7 @@ def test_what_cannot_be_recorded_is_traced_each_time(
     with caplog.at_level(logging.WARNING):
         patches = renderer.render_patches(STATES, resolution=8, seed=1)
         renderer.render_patches(STATES, resolution=8, seed=2)
-    said = "patches of this scene take longer: record(): not this one"
+    said = "pictures of this scene take longer: record(): not this one"
     assert caplog.messages == [said, said], "once for the radiance, once for the buffers"
     assert torch.equal(patches.log_radiance, expected.log_radiance)
     assert torch.equal(patches.buffers, expected.buffers)

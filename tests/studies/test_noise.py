@@ -1,21 +1,12 @@
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
-from tests.learn.command_line import SMALL, environment, run
+from tests.learn.command_line import SMALL, run, run_module
 
 
 def noise(folder: Path, *overrides: str) -> tuple[int, str]:
-    done = subprocess.run(
-        [sys.executable, "-m", "ngi.studies.noise", *SMALL, *overrides, "run.folder=run"],
-        capture_output=True,
-        text=True,
-        cwd=folder,
-        env=environment(folder),
-    )
-    return done.returncode, done.stdout + done.stderr
+    return run_module("ngi.studies.noise", *SMALL, *overrides, "run.folder=run", folder=folder)
 
 
 @pytest.mark.parametrize("deviation", [0, 3])

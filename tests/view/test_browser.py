@@ -3,8 +3,6 @@
 import shlex
 import shutil
 import socket
-import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,7 +12,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tests.learn.command_line import environment, run
+from tests.learn.command_line import environment, run, run_module
+from tests.warm import start_module
 
 playwright = pytest.importorskip(
     "playwright.sync_api", reason="browser tests need pip install -e .[viewer,dev]"
@@ -23,6 +22,8 @@ CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 if CHROMIUM is None:
     pytest.skip("browser tests need Chromium: apt-get install chromium", allow_module_level=True)
 
+DRAW_SELDOM = "requestAnimationFrame = draw => setTimeout(() => draw(performance.now()), 100)"
+"""Ten pictures a second: software that draws as many as it can leaves no time for the rest."""
 OPTIONS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader"]
 OPTIONS += ["--enable-unsafe-swiftshader"]
 WALKED = """
@@ -60,11 +61,12 @@ def free_port() -> int:
 
 @contextmanager
 def viewer(folder: Path, port: int, run_folder: str = "run") -> Iterator[str]:
-    process = subprocess.Popen(
-        [sys.executable, "-m", "ngi.view", f"run={run_folder}", f"port={port}", "resolution=64"],
-        cwd=folder,
-        env=environment(folder),
-        stdout=subprocess.DEVNULL,
+    process = start_module(
+        "ngi.view",
+        *(f"run={run_folder}", f"port={port}", "resolution=64"),
+        folder=folder,
+        environment=environment(folder),
+        output=folder / f"viewer-{port}.log",
     )
     try:
         deadline = monotonic() + 120
@@ -72,12 +74,12 @@ def viewer(folder: Path, port: int, run_folder: str = "run") -> Iterator[str]:
             with socket.socket() as probe:
                 if probe.connect_ex(("127.0.0.1", port)) == 0:
                     break
-            assert process.poll() is None, "the viewer has ended"
+            assert process.is_alive(), "the viewer has ended"
             sleep(0.2)
         yield f"http://127.0.0.1:{port}"
     finally:
         process.terminate()
-        process.wait(timeout=60)
+        process.join(timeout=60)
 
 
 @pytest.fixture(scope="module")
@@ -97,6 +99,7 @@ def browser(started: playwright.Browser) -> Iterator[playwright.Browser]:
 
 def opened(browser: playwright.Browser, address: str) -> playwright.Page:
     page = browser.new_page(viewport={"width": 1000, "height": 600}, accept_downloads=True)
+    page.add_init_script(DRAW_SELDOM)
     page.goto(address, timeout=PATIENCE)
     page.get_by_text("64 × 64 pixels").wait_for(timeout=PATIENCE)
     return page
@@ -139,13 +142,8 @@ def wait_until_changed(page: playwright.Page, before: np.ndarray) -> np.ndarray:
 
 def rendered(folder: Path, options: list[str]) -> np.ndarray:
     out = folder / "expected.png"
-    subprocess.run(
-        [sys.executable, "-m", "ngi", "render", *options, f"out={out}"],
-        cwd=folder,
-        env=environment(folder),
-        check=True,
-        capture_output=True,
-    )
+    status, output = run_module("ngi", "render", *options, f"out={out}", folder=folder)
+    assert status == 0, output
     return np.asarray(Image.open(out))
 
 
@@ -244,6 +242,7 @@ def test_a_lost_connection_comes_back(trained: Path, browser: playwright.Browser
         start = picture(page)
         set_slider(page, 1, 0.9)
         wait_until_changed(page, start)
+    page.set_default_timeout(5_000)  # a page without connection gives no picture
     with viewer(trained, port):
         deadline = monotonic() + PATIENCE / 1000
         while monotonic() < deadline:

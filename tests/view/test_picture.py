@@ -4,8 +4,6 @@ import contextlib
 import io
 import json
 import shutil
-import subprocess
-import sys
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
@@ -16,7 +14,7 @@ from PIL import Image
 
 from ngi.render.exr import write_exr
 from ngi.view.picture import main
-from tests.learn.command_line import environment, run
+from tests.learn.command_line import run, run_module
 
 RUN = "run.folder=run"
 
@@ -33,15 +31,7 @@ def render(folder: Path, *options: str) -> tuple[int, str]:
 
 
 def render_as_users_do(folder: Path, *options: str) -> tuple[int, str]:
-    done = subprocess.run(
-        [sys.executable, "-m", "ngi", "render", "run=run", *options],
-        capture_output=True,
-        text=True,
-        cwd=folder,
-        env=environment(folder),
-        timeout=300,
-    )
-    return done.returncode, done.stdout + done.stderr
+    return run_module("ngi", "render", "run=run", *options, folder=folder)
 
 
 @pytest.fixture(scope="module")

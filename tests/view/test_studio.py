@@ -10,6 +10,7 @@ from torch import Tensor
 
 from ngi.evaluate.pictures import error_picture, srgb_picture
 from ngi.render import AnalyticRenderer
+from ngi.view import pace
 from ngi.view.scene_view import PASS_SAMPLES, Place, SceneView
 from ngi.view.screen import PARTS, Screen
 from ngi.view.session import SETTLED, Wish
@@ -123,7 +124,8 @@ def test_waiting_ends_when_something_is_wanted() -> None:
     opening.join()
 
 
-def test_no_backlog_of_pictures_while_a_slider_moves() -> None:
+def test_no_backlog_of_pictures_while_a_slider_moves(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pace, "MOVING", 0)  # as on a slow machine
     pictures: list[Shown] = []
     studio = Studio(renderer=renderer(), predict=predict)
     studio.open("a", Wish(Place(V, 256), Screen()), pictures.append)
@@ -187,3 +189,17 @@ def test_tone_curves() -> None:
     assert filmic[0, 0, 1].item() == pytest.approx(expected, rel=1e-5)
     with pytest.raises(ValueError, match="curve 'pink'"):
         shown(radiance, curve="pink", exposure=0.0)
+
+
+def test_a_preview_asks_the_renderer_for_as_few_rays_as_its_place_says() -> None:
+    asked: list[int | None] = []
+
+    class Listening(AnalyticRenderer):
+        def image_buffers(self, *arguments: Tensor, **options: int | None) -> Tensor:
+            asked.append(options["samples"])
+            return super().image_buffers(*arguments, **options)  # type: ignore[arg-type]
+
+    for rays in (None, 4):
+        view = SceneView(Place(V, 32, rays), Listening(dimensions=3, patch_size=16), predict)
+        assert view.buffers.shape[0] == 32
+    assert asked == [None, 4]

@@ -1,7 +1,6 @@
 """`ngi video` on runs of closed formulas, as a user starts it."""
 
 import json
-import subprocess
 import sys
 from math import log10
 from pathlib import Path
@@ -14,7 +13,7 @@ from PIL import Image
 
 from ngi.view import film
 from ngi.view.video import main
-from tests.learn.command_line import environment, run
+from tests.learn.command_line import run, run_module
 
 av = pytest.importorskip("av", reason="the extra 'video' is missing")
 
@@ -69,17 +68,10 @@ def psnr(picture: NDArray[np.uint8], expected: NDArray[np.uint8]) -> float:
 def test_frames_are_the_pictures_of_the_render_command(trained: Path) -> None:
     """Ten frames along the hard frames are these, which training has written, too."""
     options = ("run=run", "path=hard_frames", "seconds=10", "frames_per_second=1")
-    done = subprocess.run(
-        [sys.executable, "-m", "ngi", "video", *options, f"resolution={SIZE}"],
-        capture_output=True,
-        text=True,
-        cwd=trained,
-        env=environment(trained),
-        timeout=300,
-    )
-    assert done.returncode == 0, done.stderr
-    assert "run/video_hard_frames.mp4: 10 frames; step 12" in done.stdout
-    assert "needs a reference" in done.stdout
+    status, output = run_module("ngi", "video", *options, f"resolution={SIZE}", folder=trained)
+    assert status == 0, output
+    assert "run/video_hard_frames.mp4: 10 frames; step 12" in output
+    assert "needs a reference" in output
     frames = decoded(trained / "run" / "video_hard_frames.mp4")
     assert len(frames) == 10
     pictures = [

@@ -160,7 +160,8 @@ class Sequences:
         size = torch.tensor([width, height]).to(points)
         inside = ((pixel >= 0) & (pixel < size)).all(dim=-1) & (w[..., 0] > 0)  # NaN is outside
         index = pixel[..., 1] * width + pixel[..., 0]
-        return index.where(inside, -1).long().unflatten(2, (height, width))
+        sources: Tensor = index.where(inside, -1).long().unflatten(2, (height, width))
+        return sources
 
 
 def _homogeneous(points: Tensor) -> Tensor:

@@ -104,7 +104,8 @@ class CNSR(nn.Module):
         Raises ValueError where these shapes do not fit.
         """
         representation = self.represent(observations, cameras)
-        return self.generator(buffers, torch.cat([representation, camera], dim=-1))
+        output: Tensor = self.generator(buffers, torch.cat([representation, camera], dim=-1))
+        return output
 
     def represent(self, observations: Tensor, cameras: Tensor) -> Tensor:
         """The scene as the observations show it, [n, hidden_features / 2]; see `forward`."""
@@ -119,7 +120,8 @@ class CNSR(nn.Module):
                 f"cameras of shape {list(cameras.shape)}: expected {[n, k, CAMERA_NUMBERS]}"
             )
         codes = self.encoder(observations.flatten(0, 1), cameras.flatten(0, 1))
-        return codes.unflatten(0, (n, k)).to(cameras.dtype).mean(dim=1)
+        of_images: Tensor = codes.unflatten(0, (n, k)).to(cameras.dtype)
+        return of_images.mean(dim=1)
 
     @torch.no_grad()
     def render(

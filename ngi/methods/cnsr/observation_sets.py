@@ -107,7 +107,7 @@ class ObservationSets:
     def _views(self, states: Tensor) -> Tensor:
         """States without patch position [n, dimensions] to v of every image [n, images, D]."""
         v, cameras = states.split([self._renderer.dimensions, self._shape.numel()], dim=1)
-        views = v[:, None].repeat(1, 1 + self._shape[0], 1)
+        views: Tensor = v[:, None].repeat(1, 1 + self._shape[0], 1)
         views[:, 1:, self._part] = cameras.reshape(len(states), *self._shape)
         return views
 

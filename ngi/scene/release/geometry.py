@@ -143,7 +143,8 @@ def _box_corners(points: Values) -> Values:
     if not len(points):
         return points
     low, high = points.min(axis=0), points.max(axis=0)
-    return np.where(_CUBE > 0, high, low)
+    corners: Values = np.where(_CUBE > 0, high, low)
+    return corners
 
 
 def _file(source: Source, shape: Element) -> Path:

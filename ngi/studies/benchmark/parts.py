@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from ngi.studies.benchmark.compilations import compilations
 from ngi.studies.benchmark.figures import Figure
+from ngi.studies.benchmark.frames import frames
 from ngi.studies.benchmark.inference import inference
 from ngi.studies.benchmark.leaving_out import leaving_out
 from ngi.studies.benchmark.memory import memory
@@ -90,6 +91,12 @@ PARTS = (
         "inference",
         "frames per second of buffers and the paper's network; its share of the matrix rate",
         per_scene(lambda scene, o: inference(scene, repeats=o.repeats, seconds=o.seconds)),
+        scenes=("sphere-caustic",),
+    ),
+    Part(
+        "frames",
+        "milliseconds of our frames by part, beside those of path tracing with a denoiser",
+        per_scene(lambda scene, o: frames(scene, repeats=o.repeats, seconds=o.seconds)),
         scenes=("sphere-caustic",),
     ),
 )

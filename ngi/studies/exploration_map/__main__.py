@@ -21,7 +21,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         "--output", metavar="FOLDER", type=Path, default=Path("outputs/exploration-map")
     )
     parser.add_argument(
-        "--settings", choices=("smoke", "full"), default="full", help="default: full"
+        "--settings",
+        choices=("smoke", "full", "ours", "known_500", "known_2000"),
+        default="full",
+        help="default: full; ours: uniform sampling and predicted losses with our learner; "
+        "known_…: and a sampler that knows where the rare is, over so many steps",
     )
     parser.add_argument("--seeds", type=int, nargs="+", default=[0, 1, 2, 3, 4], metavar="SEED")
     parser.add_argument(

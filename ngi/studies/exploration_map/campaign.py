@@ -20,7 +20,7 @@ from ngi.machine.memory import keep_freed_memory
 from ngi.machine.provenance import provenance
 from ngi.render import PocketRenderer
 from ngi.studies.exploration_map.plan import BASE, Plan
-from ngi.studies.exploration_map.setting import METHODS, Method, Setting
+from ngi.studies.exploration_map.setting import Method, Setting
 from ngi.studies.exploration_map.training import plain_configuration, train
 
 TABLE, PROVENANCE = "exploration_map.csv", "provenance.json"
@@ -48,7 +48,7 @@ def run_all(plan: Plan, *, seeds: Sequence[int], folder: Path, jobs: int) -> Pat
         Run(setting, method, seed)
         for seed in seeds
         for setting in plan.settings
-        for method in METHODS
+        for method in plan.methods
     ]
     _do([run for run in runs if not run.file(folder).exists()], plan, folder, jobs, len(runs))
     table = pd.concat([pd.read_csv(run.file(folder)) for run in runs], ignore_index=True)
@@ -100,7 +100,7 @@ def _claim(folder: Path, plan: Plan) -> None:
     made_with = {
         "size": size,
         "scene": PocketRenderer(**BASE.scene, patch_size=1).scene_hash,
-        "configuration": {method.name: plain_configuration(method) for method in METHODS},
+        "configuration": {m.name: plain_configuration(m, plan.learner) for m in plan.methods},
     }
     file = folder / PROVENANCE
     if file.exists():

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from itertools import product
 
-from ngi.studies.exploration_map.setting import Setting
+from ngi.studies.exploration_map.setting import AT_MOST, METHODS, OURS, Method, Setting
 
 VOLUMES = (1e-1, 1e-2, 1e-3, 1e-4)
 NOT_RARE = 0.3
@@ -17,16 +17,19 @@ BASE = Setting()
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """Settings, and the size of their runs.
+    """Settings, methods, and the size of their runs.
 
     steps: training steps of a run; evaluations: how often it is tested, evenly
     frames: scene vectors of the test set
+    learner: what all runs change in the program's configuration
     """
 
     settings: tuple[Setting, ...]
     steps: int
     evaluations: int
     frames: int
+    methods: tuple[Method, ...] = METHODS
+    learner: tuple[str, ...] = ()
 
 
 def _full() -> tuple[Setting, ...]:
@@ -50,6 +53,20 @@ def _in_dimensions(dimensions: int, volume: float) -> Setting:
     return replace(BASE, volume=volume, dimensions=dimensions, active=active)
 
 
+OUR_LEARNER = ("optimizer=muon", "schedule=warmup_stable_decay", "averaging=exponential")
+"""Of `method=ours`, all that does not concern the samples or what the network sees of them."""
+
+
+def _ours() -> tuple[Setting, ...]:
+    """Where exploration pays by the full map: volume, dimensions and noise, each alone."""
+    return (
+        BASE,
+        replace(BASE, volume=0.001),
+        _in_dimensions(32, BASE.volume),
+        replace(BASE, noise=1.0),
+    )
+
+
 PLANS = {
     "smoke": Plan(
         settings=(BASE, replace(BASE, volume=0.1, dimensions=2, active=2)),
@@ -58,4 +75,23 @@ PLANS = {
         frames=40,
     ),
     "full": Plan(settings=_full(), steps=500, evaluations=20, frames=400),
+    **{
+        f"known_{steps}": Plan(
+            settings=(BASE,),
+            steps=steps,
+            evaluations=20,
+            frames=400,
+            methods=AT_MOST,
+            learner=OUR_LEARNER,
+        )
+        for steps in (500, 2000)
+    },
+    "ours": Plan(
+        settings=_ours(),
+        steps=1000,
+        evaluations=20,
+        frames=400,
+        methods=OURS,
+        learner=OUR_LEARNER,
+    ),
 }

@@ -14,7 +14,7 @@ TARGETS = {
 ACCEPTANCES = {"greedy": "mcmc_loss_step", "metropolis": "mcmc_metropolis"}
 """And the option of the program's configuration that has it, all else being the same."""
 
-UNIFORM = "uniform"
+UNIFORM, PREDICTED = "uniform", "predicted"
 SAMPLERS = (UNIFORM, *(f"{target}_{rule}" for target, rule in product(TARGETS, ACCEPTANCES)))
 
 REUSE = ("reuse=self_tuning", "reuse.policy.bootstrap_batches=20", "reuse.policy.beta=2.0")
@@ -52,12 +52,18 @@ class Setting:
 class Method:
     """A way of choosing samples.
 
-    sampler: one of `SAMPLERS`: "uniform", or a target and an acceptance rule
+    sampler: one of `SAMPLERS`: "uniform", or a target and an acceptance rule; or `PREDICTED`; or of
+        `KNOWN`, which takes the place of the uniform one
     reuse: whether stored patches are trained on again, as the self-tuning policy says
     """
 
     sampler: str
     reuse: bool
+
+    @property
+    def predicts(self) -> bool:
+        """Whether states are drawn by their predicted losses, without chains."""
+        return self.sampler == PREDICTED
 
     @property
     def name(self) -> str:
@@ -68,8 +74,10 @@ class Method:
     def overrides(self) -> list[str]:
         """What it changes in the program's configuration."""
         reuse = REUSE if self.reuse else NO_REUSE
-        if self.sampler == UNIFORM:
+        if self.sampler == UNIFORM or self.sampler in KNOWN:
             return [f"sampler={UNIFORM}", *reuse]
+        if self.predicts:
+            return ["sampler=predicted_loss", *reuse]
         target, rule = self.sampler.rsplit("_", 1)
         return [
             f"sampler={ACCEPTANCES[rule]}",
@@ -77,5 +85,17 @@ class Method:
             *reuse,
         ]
 
+
+KNOWN = {"known": False, "known_weighted": True}
+"""Samplers that know the pockets, and whether losses are weighted back to uniform states."""
+
+KNOWN_SHARE = 0.1
+"""Of their states, that is drawn from the pockets."""
+
+OURS = tuple(Method(sampler, reuse) for reuse in (False, True) for sampler in (UNIFORM, PREDICTED))
+"""Of the map with our learner."""
+
+AT_MOST = tuple(Method(sampler, reuse=False) for sampler in (UNIFORM, PREDICTED, *KNOWN))
+"""What could be gained, and what is."""
 
 METHODS = tuple(Method(sampler, reuse) for reuse, sampler in product((False, True), SAMPLERS))

@@ -38,18 +38,26 @@ class TestSet:
         images = [renderer.whole_image(v, RESOLUTION) for v in self._scene_vectors]
         self._buffers = torch.stack([buffers for buffers, _ in images])
         self._log_radiance = torch.stack([radiance for _, radiance in images]).log1p()
+        self._dark = renderer.weights(points[: self._everywhere]).sum(dim=1) == 0
 
     @torch.no_grad()
     def errors(self, network: Callable[[Tensor, Tensor], Tensor]) -> dict[str, float]:
         """Mean error over the frames everywhere, in the pockets, and over the tail of them all.
 
+        And of the first what is due to frames without any effect (error_dark), and the mean by
+        which these are too bright (false_light).
+
         network: buffers [n, H, W, C] and v [n, D] to log1p radiance [n, H, W, 3], all on the CPU
         """
         prediction = network(self._buffers, self._scene_vectors)
-        errors = (prediction - self._log_radiance).abs().mean(dim=(1, 2, 3))
+        difference = prediction - self._log_radiance
+        errors = difference.abs().mean(dim=(1, 2, 3))
+        everywhere, brighter = errors[: self._everywhere], difference.mean(dim=(1, 2, 3))
         tail = errors.topk(math.ceil(TAIL * len(errors))).values
         return {
-            "error_uniform": errors[: self._everywhere].mean().item(),
+            "error_uniform": everywhere.mean().item(),
+            "error_dark": (everywhere * self._dark).mean().item(),
+            "false_light": (brighter[: self._everywhere] * self._dark).mean().item(),
             "error_pocket": errors[self._everywhere :].mean().item(),
             "error_tail": tail.mean().item(),
         }

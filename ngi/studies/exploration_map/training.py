@@ -15,24 +15,32 @@ from omegaconf import DictConfig, OmegaConf
 from ngi import learn
 from ngi.config.build import build_module, build_samples, build_stream, plain
 from ngi.config.configuration import composed
+from ngi.explore import MarkovChains
 from ngi.render import PocketRenderer
+from ngi.studies.exploration_map.known_pockets import KnownPockets
 from ngi.studies.exploration_map.plan import Plan
-from ngi.studies.exploration_map.setting import Method, Setting
+from ngi.studies.exploration_map.setting import KNOWN, KNOWN_SHARE, Method, Setting
 from ngi.studies.exploration_map.test_set import TestSet
 
-PARTS = ("sampler", "reuse", "resolution", "model", "loss", "optimizer", "renderer")
+PARTS = (
+    *("sampler", "reuse", "resolution", "model", "loss", "optimizer", "schedule", "averaging"),
+    "renderer",
+)
 """Of the program's configuration, that a run of the map is built from."""
 
 
 @lru_cache
-def configuration(method: Method) -> DictConfig:
-    """The program's configuration for a method; what settings change is not in it."""
-    return composed("experiment=exploration_map", *method.overrides)
+def configuration(method: Method, learner: tuple[str, ...] = ()) -> DictConfig:
+    """The program's configuration for a method; what settings change is not in it.
+
+    learner: see `Plan`
+    """
+    return composed("experiment=exploration_map", *learner, *method.overrides)
 
 
-def plain_configuration(method: Method) -> dict[str, Any]:
+def plain_configuration(method: Method, learner: tuple[str, ...] = ()) -> dict[str, Any]:
     """The parts of it that a run is built from, as plain data."""
-    return plain(OmegaConf.masked_copy(configuration(method), list(PARTS)))
+    return plain(OmegaConf.masked_copy(configuration(method, learner), list(PARTS)))
 
 
 @lru_cache(maxsize=1)
@@ -45,30 +53,43 @@ def train(setting: Setting, method: Method, seed: int, plan: Plan) -> Iterator[d
     """Trains and gives a row per evaluation: setting, method, seed, what was done, the errors.
 
     generated_batches, scored_batches: batches rendered, and those whose proposals and current
-        states were scored
+        states were scored, or whose states were drawn by their predicted losses
     lit: mean over the samples trained on of how far the scene's effects are switched on; for
         samples that are uniform it is the volume
     """
-    config = configuration(method).copy()
+    config = configuration(method, plan.learner).copy()
     config.seed, config.model.hidden_features = seed, setting.hidden_features
     renderer, test_set = _scene(setting, plan.frames)
     clock = learn.PhaseClock()
     samples = build_samples(config, renderer=renderer)
     stream = build_stream(config, samples=samples, clock=clock, patches=Path())  # not written
+    if method.sampler in KNOWN:
+        assert isinstance(stream.sampler, MarkovChains)
+        stream.sampler.proposal = KnownPockets(
+            renderer=renderer, share=KNOWN_SHARE, weighted=KNOWN[method.sampler]
+        )
     module = build_module(config, samples=samples, stream=stream, folder=Path())
     optimizer = module.configure_optimizers()
+    network = module.network if module.averaged is None else module.averaged.module
+    schedule = instantiate(config.schedule)
+    rates = [group["lr"] for group in optimizer.param_groups]
     lit = 0.0
     for step, batch in enumerate(islice(stream, plan.steps), start=1):
         lit += renderer.weights(batch.patches.scene_vector).sum(dim=1).mean().item()
+        factor = schedule.factor(steps=step - 1, used=(step - 1) / plan.steps)
+        for group, rate in zip(optimizer.param_groups, rates, strict=True):
+            group["lr"] = rate * factor
         learn.training_step(batch, module.learner, optimizer=optimizer)
         if step % (plan.steps // plan.evaluations) == 0:
+            counters = stream.counters
+            asked = counters.generated_batches if method.predicts else counters.scored_batches
             yield {
                 **asdict(setting),
                 **asdict(method),
                 "seed": seed,
                 "step": step,
-                "generated_batches": stream.counters.generated_batches,
-                "scored_batches": stream.counters.scored_batches,
+                "generated_batches": counters.generated_batches,
+                "scored_batches": asked,
                 "lit": lit / step,
-                **test_set.errors(module.network),
+                **test_set.errors(network),
             }

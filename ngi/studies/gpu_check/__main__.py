@@ -80,7 +80,7 @@ def _parser() -> argparse.ArgumentParser:
     add = parser.add_argument
     add("--dry-run", action="store_true", help="go through everything, tiny, without a GPU")
     add("--minutes", type=float, default=math.inf, metavar="M", help="end in time; no limit")
-    add("--training-minutes", type=float, default=15.0, metavar="M", help="per scene; 15")
+    add("--training-minutes", type=float, default=15.0, metavar="M", help="per run; 15")
     add("--output", type=Path, default=Path("outputs/gpu-check"), metavar="FOLDER")
     return parser
 

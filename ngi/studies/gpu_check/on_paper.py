@@ -80,7 +80,8 @@ def _is_view(operator: Any) -> bool:
 
 def counted(work: Callable[[], object]) -> Counted:
     """What the work launches."""
-    with _without_autocast(), Counted() as found:
+    found = Counted()
+    with _without_autocast(), found:
         work()
     return found
 

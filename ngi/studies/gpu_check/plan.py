@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import product
 from pathlib import Path
 
 from ngi.commands.doctor import CHECKS, examine, report
@@ -12,6 +13,7 @@ from ngi.studies.benchmark.inference import inference
 from ngi.studies.benchmark.part import Options, Part
 from ngi.studies.benchmark.parts import PARTS
 from ngi.studies.benchmark.scenes import Scene, one_per_folder, shipped
+from ngi.studies.gpu_check.graphs import LEARNERS, frames, steps
 from ngi.studies.gpu_check.item import Item, Outcome
 from ngi.studies.gpu_check.pixels import pixels
 from ngi.studies.gpu_check.runs import METHODS, learning, training
@@ -27,8 +29,10 @@ class Sizes:
     methods: trained on both devices. scenes: compared pixel by pixel, None for all
     resolution, samples: of those images. parts: of the benchmark, None for all
     seconds, repeats, patches: of a part's timings
-    training: scenes; training_overrides: of their runs, with {seconds} of the command line
-    network: hidden features and layers of the one that frames are counted of
+    training, training_methods: scenes, each trained by these methods
+    training_overrides: of their runs, with {seconds} of the command line
+    network: hidden features and layers of those whose frames are counted and recorded as graphs
+    frame: pixels along a side of the image that is recorded
     """
 
     methods: tuple[str, ...] = tuple(METHODS)
@@ -40,8 +44,12 @@ class Sizes:
     repeats: int = 20
     patches: int = 10_000
     training: tuple[str, ...] = ("living-room", "sphere-caustic")
-    training_overrides: tuple[str, ...] = ("trainer=fast", "budget.seconds={seconds}")
+    training_methods: tuple[str, ...] = ("active_exploration", "uniform")
+    training_overrides: tuple[str, ...] = (
+        *("budget=paper", "trainer=fast", "budget.seconds={seconds}"),
+    )
     network: tuple[int, int] = (512, 8)
+    frame: int = 900
 
 
 DRY = Sizes(
@@ -54,8 +62,10 @@ DRY = Sizes(
     repeats=1,
     patches=8,
     training=("cornell-box",),
+    training_methods=("active_exploration",),
     training_overrides=("budget=smoke", "evaluation.count=1"),
     network=(16, 2),
+    frame=16,
 )
 """Everything once, without a GPU."""
 
@@ -76,11 +86,13 @@ def _items(sizes: Sizes, folder: Path, training_seconds: float) -> Iterator[Item
     for part in PARTS:
         if sizes.parts is None or part.name in sizes.parts:
             yield from _benchmark(part, sizes)
-    for name in sizes.training:
+    yield from _graphs(sizes)
+    for name, method in product(sizes.training, sizes.training_methods):
         changed = (option.format(seconds=training_seconds) for option in sizes.training_overrides)
-        overrides = (f"scene={name}", *changed, f"run.references={folder / 'references'}")
-        train = partial(training, folder / "training" / name, overrides)
-        yield Item("training", name, train, goes_on=True)
+        chosen = (f"scene={name}", f"method={method}", *changed)
+        overrides = (*chosen, f"run.references={folder / 'references'}")
+        train = partial(training, folder / "training" / name / method, overrides)
+        yield Item("training", f"{name}, {method}", train, goes_on=True)
     for scene in shipped(sizes.training):
         yield _whole("frames", scene.name, partial(_frames, scene, sizes), MOST_SECONDS)
 
@@ -88,6 +100,14 @@ def _items(sizes: Sizes, folder: Path, training_seconds: float) -> Iterator[Item
 def _whole(stage: str, name: str, measure: Callable[[], Outcome], seconds: float = 120.0) -> Item:
     """What can not go on where it was cut off, and does not ask how much time is left."""
     return Item(stage, name, lambda _: measure(), seconds)
+
+
+def _graphs(sizes: Sizes) -> Iterator[Item]:
+    features, layers = sizes.network
+    size = {"features": features, "layers": layers, "repeats": sizes.repeats}
+    for name in LEARNERS:
+        yield _whole("graphs", f"step, {name}", partial(steps, name, **size))
+    yield _whole("graphs", "frame", partial(frames, resolution=sizes.frame, **size))
 
 
 def _frames(scene: Scene, sizes: Sizes) -> Outcome:

@@ -94,7 +94,7 @@ def test_samples_per_pixel(given, default, expected) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["speed"], "no part speed; there are compilations, inference"),
+        (["speed"], "no part speed; there are compilations, frames, inference"),
         (["scenes=[moon]"], "no scene moon; there are archviz"),
         (["release=[nowhere]"], "nowhere: no scene.xml is there"),
         (["repeats=0"], "repeats: 0 is not positive"),

@@ -1,14 +1,17 @@
-from dataclasses import fields
+import math
+from dataclasses import fields, replace
 
 import pytest
 import torch
 
 from ngi.render import PocketRenderer
-from ngi.studies.exploration_map.plan import PLANS, Plan
+from ngi.studies.exploration_map import training
+from ngi.studies.exploration_map.plan import OUR_LEARNER, PLANS, Plan
 from ngi.studies.exploration_map.setting import METHODS, Method, Setting
 from ngi.studies.exploration_map.test_set import TestSet
 from ngi.studies.exploration_map.training import configuration, train
 
+AVERAGED = "averaging=exponential"
 SMALL = Plan(settings=(), steps=12, evaluations=3, frames=20)
 SETTING = Setting(volume=0.1, dimensions=2, active=2, hidden_features=8)
 
@@ -79,6 +82,37 @@ def test_methods_are_what_their_names_say(method: Method) -> None:
     assert config.reuse.policy._target_.endswith("SelfTuning" if method.reuse else "Never")
 
 
+def test_predictions_are_counted_as_scores_are() -> None:
+    """One per new batch, also where chains would have nothing to be compared with yet."""
+    method = Method("predicted", reuse=False)
+    last = rows(method)[-1]
+    assert configuration(method).sampler._target_ == "ngi.explore.PredictedLoss"
+    assert (last["generated_batches"], last["scored_batches"]) == (12, 12)
+
+
+def test_our_learner_follows_its_schedule_and_tests_averaged_weights(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    uniform = Method("uniform", reuse=False)
+    config = configuration(uniform, OUR_LEARNER)
+    assert config.optimizer._target_.endswith("MuonAdam")
+    rates: list[list[float]] = []
+
+    def noted(*arguments, optimizer, **others):
+        rates.append([group["lr"] for group in optimizer.param_groups])
+        return training_step(*arguments, optimizer=optimizer, **others)
+
+    training_step = training.learn.training_step
+    monkeypatch.setattr(training.learn, "training_step", noted)
+    decaying = replace(SMALL, learner=("schedule=cosine", "schedule.warmup_steps=0"))
+    found = rows(uniform, plan=decaying)
+    expected = [0.02 + 0.98 * (1 + math.cos(math.pi * step / 12)) / 2 for step in range(12)]
+    assert [rate / 2e-3 for (rate,) in rates] == pytest.approx(expected)
+    averaged = rows(uniform, plan=replace(decaying, learner=(*decaying.learner, AVERAGED)))
+    assert averaged[-1]["lit"] == found[-1]["lit"]
+    assert averaged[-1]["error_uniform"] != found[-1]["error_uniform"]
+
+
 def test_there_are_fourteen_methods_and_every_knob_is_varied() -> None:
     assert len({method.name for method in METHODS}) == 14
     settings = PLANS["full"].settings
@@ -113,6 +147,28 @@ def test_errors_are_means_over_the_frames() -> None:
     assert errors["error_uniform"] == pytest.approx(sum(everywhere) / 36, abs=1e-5)
     assert errors["error_pocket"] == pytest.approx(sum(inside) / 4, abs=1e-5)
     assert errors["error_tail"] == pytest.approx(sum(worst) / 2, abs=1e-5)
+
+
+def test_errors_where_nothing_is_lit() -> None:
+    """Too bright there by v's first component, which is as large as it is dark elsewhere."""
+    renderer = PocketRenderer(**SETTING.scene, patch_size=8)
+    seen = []
+    network = Shifted(renderer)
+
+    def dimmed(buffers: torch.Tensor, scene_vector: torch.Tensor) -> torch.Tensor:
+        seen.append(scene_vector)
+        answer = network(buffers, scene_vector)
+        lit = renderer.weights(scene_vector).sum(dim=1) > 0
+        return answer - 2 * (lit * scene_vector[:, 0])[:, None, None, None]
+
+    errors = TestSet(renderer, frames=40).errors(dimmed)
+    everywhere = seen[0][:36]
+    dark = renderer.weights(everywhere).sum(dim=1) == 0
+    assert 0 < dark.sum() < 36
+    expected = everywhere[dark, 0].sum().item() / 36
+    assert errors["error_dark"] == pytest.approx(expected, abs=1e-5)
+    assert errors["false_light"] == pytest.approx(expected, abs=1e-5)
+    assert errors["error_uniform"] == pytest.approx(everywhere[:, 0].mean().item(), abs=1e-5)
 
 
 def test_a_tenth_of_the_frames_is_in_the_pockets() -> None:

@@ -3,6 +3,7 @@
 import json
 import time
 from collections.abc import Iterator
+from itertools import product
 from pathlib import Path
 
 import pytest
@@ -18,6 +19,7 @@ from ngi.studies.gpu_check.plan import Sizes, items
 from ngi.studies.gpu_check.record import Record
 from ngi.studies.gpu_check.runs import METHODS
 
+TRAINED = ("active_exploration", "uniform")
 ABOUT = {
     "machine": {"gpu": "Some GPU", "processor": "x", "backend": "cuda"},
     "versions": {"torch": "2"},
@@ -128,7 +130,9 @@ def test_at_full_size_it_measures_every_scene_method_and_part(tmp_path: Path) ->
     assert {item.name for item in every if item.stage == "learning"} == set(METHODS)
     assert sum(item.stage == "pixels" for item in every) == len(one_per_folder())
     assert all(item.seconds < 600 for item in every)
-    assert {"training/living-room", "training/sphere-caustic", "benchmark/training"} <= set(keys)
+    for scene, method in product(("living-room", "sphere-caustic"), TRAINED):
+        assert f"training/{scene}, {method}" in keys
+    assert "benchmark/training" in keys
 
 
 def test_without_a_gpu_it_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -143,11 +147,12 @@ def test_the_dry_run_goes_through_everything(tmp_path: Path) -> None:
     (file,) = tmp_path.rglob("gpu-check.json")
     found = json.loads(file.read_text())["items"]
     stages = {key.partition("/")[0] for key in found}
-    assert stages == {"doctor", "learning", "pixels", "benchmark", "training", "frames"}
+    assert stages == {"doctor", "learning", "pixels", "benchmark", "graphs", "training", "frames"}
     assert all("figures" in entry for entry in found.values())
-    repeats = found["learning/active_exploration"]["figures"][1]
-    assert (repeats["name"], repeats["median"]) == (
-        "active_exploration: a run repeats bit for bit",
-        1,
-    )
+    learnt = {f["name"]: f["median"] for f in found["learning/active_exploration"]["figures"]}
+    for name in ("a run repeats bit for bit", "the same bits as CUDA graphs"):
+        assert learnt[f"active_exploration: {name}"] == 1
+    for name in ("step, paper", "step, ours", "frame"):
+        *_, apart = found[f"graphs/{name}"]["figures"]
+        assert ("largest difference" in apart["name"], apart["median"]) == (True, 0)
     assert {"commit", "versions"} <= provenance(backend="").keys() & found["doctor"].keys()

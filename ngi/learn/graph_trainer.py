@@ -1,0 +1,9 @@
+"""A trainer that launches steps and images as CUDA graphs."""
+
+from __future__ import annotations
+
+from ngi.learn.lightning_api import Trainer
+
+
+class GraphTrainer(Trainer):
+    """Lightning's. On a GPU `IlluminationModule` records what it computes (`Captured`) for it."""

@@ -1,0 +1,99 @@
+"""Frames of our method by their parts, beside those of path tracing with a denoiser."""
+
+from __future__ import annotations
+
+from functools import partial
+from itertools import count
+
+import torch
+from torch import Tensor, nn
+
+from ngi.denoise import OpenImageDenoise
+from ngi.machine.precision import fast_precision
+from ngi.machine.timing import in_turn
+from ngi.methods.path_tracing.tracing import PathTracing
+from ngi.models.frame import show
+from ngi.render.mitsuba_renderer import MitsubaRenderer
+from ngi.studies.benchmark.figures import Figure, figure, ratio
+from ngi.studies.benchmark.scenes import Scene
+from ngi.studies.benchmark.training import OURS
+
+RESOLUTIONS = (96, 256, 900)
+"""That of the test frames of `budget=small`, of the viewer, and of the paper's pictures."""
+FEATURES, LAYERS = 128, 6
+"""Of the network of `budget=small`."""
+SAMPLES_PER_PIXEL = 8
+"""Of the paths that are denoised."""
+
+
+def frames(scene: Scene, *, repeats: int, seconds: float) -> list[Figure]:
+    """Milliseconds by part, of frames whose v is a new one every time.
+
+    The denoiser is given buffers for nothing: it needs those without direct light, which take less
+    than ours.
+    """
+    renderer = MitsubaRenderer(scene=scene.read(), direct="traced")
+    network = OURS.network(
+        layout=renderer.layout,
+        scene_dimensions=renderer.dimensions,
+        hidden_features=FEATURES,
+        hidden_layers=LAYERS,
+        relative=True,
+        moving=renderer.moving_points,
+    ).to("cuda" if torch.cuda.is_available() else "cpu")
+    made = [
+        _frames(renderer, network, resolution, repeats=repeats, seconds=seconds / len(RESOLUTIONS))
+        for resolution in RESOLUTIONS
+    ]
+    return [figure for figures in made for figure in figures]
+
+
+def _frames(
+    renderer: MitsubaRenderer,
+    network: nn.Module,
+    resolution: int,
+    *,
+    repeats: int,
+    seconds: float,
+) -> list[Figure]:
+    tracing = PathTracing(
+        renderer=renderer,
+        denoiser=OpenImageDenoise(),
+        samples_per_pixel=SAMPLES_PER_PIXEL,
+        seed=0,
+    )
+    hard, numbers = renderer.hard_frames(), count()
+    buffers = renderer.image_buffers(hard[0], resolution=resolution).cpu()
+    noisy = tracing.trace(hard[0], resolution=resolution)
+    precision = torch.bfloat16 if fast_precision() == "bf16-mixed" else torch.float32
+
+    def next_v() -> Tensor:
+        return hard[next(numbers) % len(hard)]
+
+    of_buffers, of_network, of_paths, of_denoiser = in_turn(
+        repeats,
+        f"frames, {resolution} pixels",
+        lambda: renderer.image_buffers(next_v(), resolution=resolution),
+        lambda: show(network, buffers, next_v(), precision),
+        lambda: tracing.trace(next_v(), resolution=resolution),
+        partial(tracing.denoise, noisy, buffers),
+        seconds=seconds,
+    )
+    ours = [a + b for a, b in zip(of_buffers, of_network, strict=True)]
+    denoised = [a + b for a, b in zip(of_paths, of_denoiser, strict=True)]
+    size = f"{resolution} × {resolution}"
+    parts = {
+        "buffers with direct light": of_buffers,
+        f"network {LAYERS}x{FEATURES}": of_network,
+        "ours": ours,
+        f"paths, {SAMPLES_PER_PIXEL} samples per pixel": of_paths,
+        "denoiser": of_denoiser,
+        "paths and denoiser": denoised,
+    }
+    return [
+        *(
+            figure(f"{part}, {size}", [1e3 * t for t in times], "ms")
+            for part, times in parts.items()
+        ),
+        figure(f"ours / paths and denoiser, {size}", ratio(ours, denoised), "×", "≤ 0.5"),
+    ]

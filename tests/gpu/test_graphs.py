@@ -1,0 +1,151 @@
+"""What is recorded as a CUDA graph comes to what is launched kernel by kernel."""
+
+import logging
+from pathlib import Path
+
+import pytest
+import torch
+from torch import Tensor, nn
+
+from ngi.learn.graph_trainer import GraphTrainer
+from ngi.machine.captured import MOST, Captured
+from ngi.view.trained_run import RECORDS, TrainedRun
+from tests.gpu.pretended import DEVICE, Ledger
+from tests.gpu.test_runs import RUNS, trained
+from tests.learn.command_line import SMALL
+from tests.learn.comparison import assert_same_run
+from tests.learn.lightning_warnings import IGNORED, RESUMED
+
+pytestmark = [*IGNORED, RESUMED]
+
+
+@pytest.fixture
+def network(gpu: Ledger) -> nn.Module:  # noqa: ARG001
+    torch.manual_seed(0)
+    return nn.Sequential(nn.Linear(3, 4), nn.ReLU(), nn.Linear(4, 2)).to(DEVICE)
+
+
+def captured(network: nn.Module) -> Captured:
+    return Captured(lambda x: (network(x), x.sum()), module=network, name="tests")
+
+
+def random(*shape: int) -> Tensor:
+    return torch.rand(*shape).to(DEVICE)
+
+
+def assert_as_launched(recorded: Captured, network: nn.Module, x: Tensor) -> None:
+    answer, total = recorded(x)
+    assert torch.equal(answer.cpu(), network(x).cpu())
+    assert total.item() == x.sum().item()
+
+
+@torch.no_grad()
+def test_from_the_third_call_on_a_graph_is_launched(gpu: Ledger, network: nn.Module) -> None:
+    recorded = captured(network)
+    for number in range(4):
+        x = random(5, 3)
+        gpu.clear()
+        answer, _ = recorded(x)
+        assert gpu.launches["graph"] == (number > 0)
+        assert (gpu.launches["aten.addmm.default"] == 0) == (number > 1)
+        assert gpu.waits.total() == 0
+        assert torch.equal(answer.cpu(), network(x).cpu())
+
+
+@torch.no_grad()
+def test_weights_are_read_as_they_are_when_it_is_launched(network: nn.Module) -> None:
+    recorded = captured(network)
+    for _ in range(4):
+        assert_as_launched(recorded, network, random(5, 3))
+        for parameter in network.parameters():
+            parameter.mul_(-0.5)
+
+
+@torch.no_grad()
+def test_weights_that_have_moved_are_read_where_they_are(network: nn.Module) -> None:
+    """As Lightning moves them at the end of training."""
+    recorded = captured(network)
+    for _ in range(3):
+        assert_as_launched(recorded, network, random(5, 3))
+    network.to("cpu").to(DEVICE)
+    for parameter in network.parameters():
+        parameter.add_(1.0)
+    for _ in range(3):
+        assert_as_launched(recorded, network, random(5, 3))
+
+
+@torch.no_grad()
+def test_every_shape_has_a_graph_of_its_own_but_not_too_many(
+    gpu: Ledger, network: nn.Module
+) -> None:
+    recorded = captured(network)
+    for _ in range(3):
+        for size in range(1, MOST + 2):
+            gpu.clear()
+            assert_as_launched(recorded, network, random(size, 3))
+    assert gpu.launches["graph"] == 0  # of the last shape, one too many
+
+
+def test_weights_that_autocast_has_cast_are_cast_anew(network: nn.Module) -> None:
+    """Within a longer time of autocast, as Lightning's around a step."""
+    recorded = captured(network)
+    for _ in range(4):
+        with torch.autocast("cuda", torch.bfloat16):
+            network(random(2, 3))  # has the weights cast, and kept
+            x = random(5, 3)
+            answer, _ = recorded(x)
+            expected = network(x)
+        assert torch.equal(answer.cpu(), expected.cpu())
+        with torch.no_grad():
+            for parameter in network.parameters():
+                parameter.mul_(-2.0)
+
+
+def test_what_asks_the_device_is_launched_as_it_is_and_said_once(
+    network: nn.Module, caplog: pytest.LogCaptureFixture
+) -> None:
+    recorded = Captured(
+        lambda x: (network(x) if x.sum().item() > 0 else x,), module=network, name="asking"
+    )
+    for _ in range(4):
+        x = random(5, 3)
+        assert torch.equal(recorded(x)[0].cpu(), network(x).cpu())
+    (line,) = (r.getMessage() for r in caplog.records if r.levelno >= logging.WARNING)
+    assert line.startswith("asking: not recorded as a CUDA graph, launched kernel by kernel: CUDA")
+
+
+def test_on_the_cpu_nothing_is_recorded(caplog: pytest.LogCaptureFixture) -> None:
+    network = nn.Linear(3, 2)
+    recorded = captured(network)
+    for _ in range(3):
+        assert_as_launched(recorded, network, torch.rand(5, 3))
+    assert not caplog.records  # nor tried
+
+
+LONGER = ("budget.steps=24",)
+
+
+@pytest.mark.parametrize("name", ["paper, metropolis", "ours, exploring", "cnsr"])
+def test_a_run_of_graphs_is_the_same_bit_for_bit(gpu: Ledger, tmp_path: Path, name: str) -> None:
+    options = (*RUNS[name], *LONGER)
+    trained(tmp_path / "launched", *options, "trainer=fast")
+    assert gpu.launches["graph"] == 0
+    trained(tmp_path / "recorded", *options, "trainer=graphs")
+    assert gpu.launches["graph"] > 8
+    assert_same_run(tmp_path / "launched" / "run", tmp_path / "recorded" / "run")
+
+
+def test_without_a_gpu_it_is_the_same_as_without_graphs(tmp_path: Path) -> None:
+    for trainer in ("fast", "graphs"):
+        trained(tmp_path / trainer, *SMALL, f"trainer={trainer}")
+    assert_same_run(tmp_path / "fast" / "run", tmp_path / "graphs" / "run")
+
+
+def test_images_of_such_a_run_are_recorded(gpu: Ledger, tmp_path: Path) -> None:
+    trained(tmp_path, *SMALL, "trainer=graphs")
+    assert f"{GraphTrainer.__module__}.{GraphTrainer.__qualname__}" == RECORDS
+    run = TrainedRun.open(tmp_path / "run")
+    v = run.renderer.hard_frames()[0]
+    images = [run.radiance(v, resolution=24) for _ in range(3)]
+    assert gpu.launches["graph"] > 0
+    assert torch.equal(images[0], images[2])

@@ -1,0 +1,138 @@
+"""How noisy a patch is, told by its two halves, and its loss without that."""
+
+from itertools import islice
+from pathlib import Path
+
+import pytest
+import torch
+from torch import Tensor
+
+from ngi.explore import Importance, PredictedLoss
+from ngi.learn import PatchSamples, training_step
+from ngi.learn.batch import Batch, Feedback
+from ngi.learn.noise import noise_loss, without_noise
+from ngi.models import L1Dssim, SampleLoss
+from ngi.patches import Patches
+from ngi.render import AnalyticRenderer, PocketRenderer
+from ngi.reuse import Epochs
+from tests.learn.small_stream import make
+from tests.learn.test_step import module
+
+COUNT = 200
+
+
+def renderer(noise: float) -> PocketRenderer:
+    return PocketRenderer(
+        dimensions=3, volume=0.1, pockets=1, sharpness=0.0, patch_size=16, noise=noise
+    )
+
+
+def states() -> Tensor:
+    return torch.rand(COUNT, 5, generator=torch.Generator().manual_seed(0))
+
+
+def rendered(noise: float) -> tuple[Batch, Tensor]:
+    """Patches traced in two halves, and the truth [n, P, P, 3]."""
+    found = (
+        PatchSamples(renderer=renderer(noise), halves=True)
+        .start_patches(states(), resolution=24, seed=3)
+        .result()
+    )
+    truth = renderer(0.0).render_patches(states(), resolution=24, seed=3).log_radiance
+    patches = Patches(
+        scene_vector=states()[:, :-2],
+        position=states()[:, -2:],
+        resolution=torch.full((COUNT,), 24),
+        large_step=torch.ones(COUNT, dtype=torch.bool),
+        buffers=found.buffers,
+        log_radiance=found.log_radiance,
+    )
+    ids = torch.arange(COUNT)
+    return Batch(patches, ids, generated=True, current=None, first_half=found.first_half), truth
+
+
+def predicted() -> PredictedLoss:
+    return PredictedLoss(
+        chains=4,
+        candidates=8,
+        importance=Importance(uniform_share=0.5),
+        memory=64,
+        trees=1,
+        depth=1,
+        smallest_leaf=1,
+    )
+
+
+def squared(prediction: Tensor, target: Tensor) -> Tensor:
+    return (prediction - target).square().mean(dim=(1, 2, 3))
+
+
+def test_a_patch_is_the_mean_of_its_halves() -> None:
+    """Half of the variance of one rendering, twice its paths."""
+    batch, truth = rendered(0.2)
+    single = renderer(0.2).render_patches(states(), resolution=24, seed=3)
+    assert batch.first_half is not None
+    assert torch.equal(batch.first_half, single.log_radiance)
+    ratio = squared(batch.patches.log_radiance, truth) / squared(single.log_radiance, truth)
+    assert ratio.median().item() == pytest.approx(0.5, abs=0.03)
+    halves = PatchSamples(renderer=renderer(0.2), halves=True)
+    paths = halves.start_patches(states(), resolution=24, seed=3).result().paths
+    assert paths == 2 * single.paths
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.1])
+def test_squared_errors_without_noise_have_no_bias(offset: float) -> None:
+    """Whatever the network answers: the truth, or too bright and too dark by the same.
+
+    Noise darkens the mean of a logarithm, by its variance; of both signs that cancels out.
+    """
+    batch, truth = rendered(0.1)
+    target = batch.patches.log_radiance
+    measured = (squared(truth + offset, target) + squared(truth - offset, target)) / 2
+    error = measured - noise_loss(squared, batch) - offset**2
+    assert error.mean().abs().item() < 4 * error.std().item() / COUNT**0.5
+    assert error.mean().abs().item() < 0.05 * (measured.mean().item() - offset**2)
+
+
+@pytest.mark.parametrize("noise", [0.3, 1.0])
+@pytest.mark.parametrize("offset", [0.0, 0.05, 0.2, 0.8])
+def test_losses_without_noise_are_closer_to_those_of_the_truth(noise: float, offset: float) -> None:
+    loss: SampleLoss = L1Dssim(l1_weight=1.0, dssim_weight=1.0, window_size=7)
+    batch, truth = rendered(noise)
+    without = loss(truth + offset, truth)
+    measured = loss(truth + offset, batch.patches.log_radiance)
+    corrected = without_noise(measured, noise_loss(loss, batch))
+    assert (corrected - without).mean().abs() < 0.75 * (measured - without).mean().abs()
+
+
+def test_a_loss_below_the_noise_is_none() -> None:
+    found = without_noise(torch.tensor([0.5, 0.5, 0.3]), torch.tensor([0.3, 0.6, 0.0]))
+    assert found.tolist() == pytest.approx([0.4, 0.0, 0.3])
+
+
+def test_a_step_on_patches_in_two_halves_tells_their_noise(tmp_path: Path) -> None:
+    """The network learns from the mean, the stream hears of the noise; stored patches have none."""
+    told: list[Feedback] = []
+    small = AnalyticRenderer(dimensions=3, patch_size=8, noise=0.3)
+    stream = make(tmp_path, sampler=predicted(), rule=Epochs(), renderer=small, halves=True)
+    feedback = stream.feedback
+    stream.feedback = lambda given: (told.append(given), feedback(given))[1]  # type: ignore[method-assign, assignment, func-returns-value]
+    learner = module(stream, tmp_path)
+    optimizer = learner.configure_optimizers()
+    batches = []
+    for batch in islice(stream, 12):
+        batches.append(batch)
+        training_step(batch, learner.learner, optimizer=optimizer)
+    assert {batch.generated for batch in batches} == {True, False}
+    for batch, given in zip(batches, told, strict=True):
+        assert (given.noise is not None) == batch.generated
+        if given.noise is not None:
+            assert torch.equal(given.noise, noise_loss(learner.loss, batch))
+
+
+def test_the_sampler_is_told_the_losses_without_noise(tmp_path: Path) -> None:
+    stream = make(tmp_path, sampler=predicted(), rule=Epochs())
+    next(iter(stream))
+    losses, noise = torch.tensor([0.5, 0.6, 1.0, 0.2]), torch.tensor([0.3, 0.0, 0.6, 0.3])
+    stream.feedback(Feedback(losses, None, None, noise))
+    assert stream.chains.loss.tolist() == pytest.approx([0.4, 0.6, 0.8, 0.0])  # type: ignore[attr-defined]

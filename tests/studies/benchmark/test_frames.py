@@ -1,0 +1,21 @@
+import pytest
+
+from ngi.machine.backend import llvm_problem
+from ngi.studies.benchmark import frames
+from ngi.studies.benchmark.scenes import shipped
+
+[MIRROR] = shipped(["mirror"])
+
+
+@pytest.mark.skipif(llvm_problem() is not None, reason=str(llvm_problem()))
+def test_frames_take_as_long_as_their_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(frames, "RESOLUTIONS", (24, 32))
+    figures = frames.frames(MIRROR, repeats=1, seconds=60)
+    assert len(figures) == 2 * 7
+    for resolution, of_one in ((24, figures[:7]), (32, figures[7:])):
+        assert all(f.name.endswith(f"{resolution} × {resolution}") for f in of_one)
+        buffers, network, ours, paths, denoiser, denoised, share = (f.median for f in of_one)
+        assert min(buffers, network, paths, denoiser) > 0
+        assert ours == pytest.approx(buffers + network)
+        assert denoised == pytest.approx(paths + denoiser)
+        assert share == pytest.approx(ours / denoised)
