@@ -174,8 +174,11 @@ class ColdRenderer(AnalyticRenderer):
 
 def test_workers_warm_up(fake) -> None:
     fake()
-    renderer = WorkerRenderer(ColdRenderer, workers=2)
-    with pytest.raises(OSError, match="cold"):
+    # Closed, so that no thread goes on into the next test: a start sets Dr.Jit's threads.
+    with (
+        WorkerRenderer(ColdRenderer, workers=2) as renderer,
+        pytest.raises(OSError, match="cold"),
+    ):
         renderer.warm_up()
 
 
