@@ -59,6 +59,7 @@ def test_further_overrides_stand_with_the_users(words: str, expected: str) -> No
 TINY = (
     "renderer=analytic",
     "~renderer.direct",
+    "~renderer.specular",
     "evaluation=smoke",
     "model.hidden_features=16",
     "budget.seconds=2",

@@ -109,8 +109,8 @@ METHODS = {  # sampler, resolution, model, what the renderer traces into the buf
     "cnsr": ("uniform", "constant", "cnsr", []),
     "anf": ("uniform", "constant", "anf", []),
     "traced_specular": ("mcmc_loss_step", "growing", PRECONDITIONED, ["specular"]),
-    "ours": ("sobol", "constant", "encoded_generator", ["direct"]),
-    "ours_uniform": ("uniform", "constant", "encoded_generator", ["direct"]),
+    "ours": ("sobol", "constant", "encoded_generator", ["direct", "specular"]),
+    "ours_uniform": ("uniform", "constant", "encoded_generator", ["direct", "specular"]),
     "traced_direct": ("mcmc_loss_step", "growing", PRECONDITIONED, ["direct"]),
 }
 PRIORITISED = {"_target_": "ngi.reuse.Prioritised", "alpha": 0.6, "beta": 0.4, "epsilon": 1e-6}
@@ -242,6 +242,7 @@ CHANGED = {
     "camera_left_out": "data",
     "denoised_targets": "data",
     "direct_light": "renderer",
+    "specular_bounces": "renderer",
     "steady_reuse": "reuse",
     "large_images": "resolution",
     "small_batches": "sampler",

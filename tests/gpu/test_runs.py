@@ -19,7 +19,8 @@ pytestmark = [*IGNORED, RESUMED]
 
 OURS = (
     *(option for option in SMALL if "beta" not in option),
-    *("method=ours", "~renderer.direct", "schedule.warmup_steps=2", "model.octaves=2"),
+    *("method=ours", "~renderer.direct", "~renderer.specular"),
+    *("schedule.warmup_steps=2", "model.octaves=2"),
 )
 SETS = (
     "renderer._target_=tests.learn.moving_camera.moving_camera",

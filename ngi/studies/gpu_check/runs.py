@@ -30,7 +30,7 @@ METHODS = {
     ),
     "ours": (
         *("renderer.patch_size=16", "resolution.start=32"),
-        *("schedule.warmup_steps=5", "~renderer.direct"),  # closed formulas always give it
+        *("schedule.warmup_steps=5", "~renderer.direct", "~renderer.specular"),  # not of formulas
         "data=patches_without_camera",  # Open Image Denoise is not on every machine
     ),
     "cnsr": ("renderer.patch_size=16", "resolution.start=16", "sampler.chains=4"),
