@@ -1,4 +1,4 @@
-"""Traced direct light against closed forms; `test_direct_integrator` compares whole scenes."""
+"""Traced direct light against closed forms; `test_shipped_scenes` compares whole scenes."""
 
 import numpy as np
 import pandas as pd

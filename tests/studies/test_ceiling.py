@@ -15,7 +15,8 @@ from ngi.studies.ceiling.runs import Run, plan, true_errors
 
 SMALL = (
     *("renderer=pockets", "data=patches", "renderer.patch_size=16", "renderer.dimensions=2"),
-    *("~renderer.direct", "~renderer.specular", "budget=smoke", "trainer=fp32", "model.hidden_features=16"),
+    *("~renderer.direct", "~renderer.specular", "budget=smoke", "trainer=fp32"),
+    "model.hidden_features=16",
     "model.directions=false",
     *("resolution.start=32", "sampler.chains=4", "evaluation.evaluator.protocol.resolution=32"),
     *("ceiling.pool=64", "ceiling.patches=[16]", "ceiling.steps=[8]", "ceiling.rounds=2"),
