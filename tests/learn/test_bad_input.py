@@ -52,7 +52,7 @@ def test_an_error_of_the_command_line_ends_it(
         (["optimizer=muon", "optimizer.momentum=1"], ["optimizer.momentum: 1"]),
         (
             ["schedule=warmup_stable_decay", "budget.steps=12"],
-            ["schedule.warmup_steps: 30", "budget.steps: 12"],
+            ["schedule.warmup_steps: 30", "budget.steps: 12", "schedule.warmup_steps=3"],
         ),
         (["averaging=exponential", "averaging.decay=1"], ["averaging.decay: 1"]),
         (["model._target_=torch.nn.ReLU"], ["model: ReLU", "unexpected", "hidden_features"]),
