@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Self
 
+import torch
 from torch import Tensor, nn
-from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
+from torch.optim.swa_utils import AveragedModel
 
 Averaging = Callable[[nn.Module], AveragedModel | None]
 """Makes the averaged copy of a network, to be updated after every step; None for no average."""
@@ -29,21 +30,33 @@ def exponential_average(network: nn.Module, *, decay: float) -> AveragedModel:
     """
     if not 0 <= decay < 1:
         raise ValueError(f"averaging.decay: {decay}; expected at least 0, below 1")
-
-    def average(averaged: list[Tensor], current: list[Tensor], steps: Tensor | int) -> None:
-        count = int(made.n_averaged)  # `steps` is the same, on the weights' device
-        kept = min(decay, (1 + count) / (10 + count))
-        get_ema_multi_avg_fn(kept)(averaged, current, steps)
-
-    made = _CountedByTheHost(network, multi_avg_fn=average)  # type: ignore[arg-type]
-    return made.requires_grad_(False)
+    return _ExponentialAverage(network, decay=decay).requires_grad_(False)
 
 
-class _CountedByTheHost(AveragedModel):
-    """The number of its steps stays on the CPU wherever its weights go.
+class _ExponentialAverage(AveragedModel):
+    """Its number of steps stays on the CPU wherever its weights go, and is asked for there.
 
-    A GPU would be waited for three times a step.
+    PyTorch's own step has a GPU waited for: four times, or once with the number on the CPU.
     """
+
+    def __init__(self, network: nn.Module, *, decay: float) -> None:
+        super().__init__(network)
+        self._decay = decay
+
+    @torch.no_grad()
+    def update_parameters(self, model: nn.Module) -> None:
+        """Takes the weights after a step into the average, and the buffers as they are."""
+        steps = int(self.n_averaged)
+        averages: list[Tensor] = [*self.parameters()]
+        weights: list[Tensor] = [*model.parameters()]
+        if steps == 0:
+            torch._foreach_copy_(averages, weights)
+        else:
+            kept = min(self._decay, (1 + steps) / (10 + steps))
+            torch._foreach_lerp_(averages, weights, 1 - kept)
+        for averaged, buffer in zip(self.module.buffers(), model.buffers(), strict=True):
+            averaged.copy_(buffer)
+        self.n_averaged += 1
 
     def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> Self:
         count = self.n_averaged

@@ -10,6 +10,7 @@ import pytest
 import torch
 from torch import Tensor
 from torch.nn.utils import clip_grad
+from torch.optim import swa_utils
 
 from ngi.patches import uploaded
 from ngi.render.closed_form import ClosedFormRenderer
@@ -156,7 +157,7 @@ def _patch_renderers(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def _patch_grouping(monkeypatch: pytest.MonkeyPatch) -> None:
-    """C++ groups gradients by the device that it takes them to be on."""
+    """C++ groups gradients and weights by the device that it takes them to be on."""
     group = clip_grad._group_tensors_by_device_and_dtype
 
     def grouped(lists: list[list[Tensor]], *rest: Any) -> dict[tuple[Any, Any], Any]:
@@ -165,4 +166,5 @@ def _patch_grouping(monkeypatch: pytest.MonkeyPatch) -> None:
             for (_, dtype), (members, indices) in group(lists, *rest).items()
         }
 
-    monkeypatch.setattr(clip_grad, "_group_tensors_by_device_and_dtype", grouped)
+    for module in (clip_grad, swa_utils):
+        monkeypatch.setattr(module, "_group_tensors_by_device_and_dtype", grouped)
