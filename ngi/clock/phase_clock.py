@@ -2,7 +2,7 @@
 
 "Error against run time" compares methods at equal time, so evaluating and writing checkpoints,
 which are ours and not the method's, stop the clock. Nothing of the method may go on meanwhile, so
-that patches which other processes render are waited for first (`TrainingStream.finish_rendering`).
+that patches which other processes render are waited for first (`TrainingStream.catch_up`).
 
 Run time is either that of the wall clock, or counted with measured costs (`ModelClock`).
 """

@@ -21,12 +21,13 @@ from ngi.learn.interruption import Interrupted, Interruption
 from ngi.learn.learning_rate import LearningRate
 from ngi.learn.lightning_trackers import MLflow, TensorBoard
 from ngi.learn.module import IlluminationModule, seeded
+from ngi.learn.outcome import Outcome, Step
 from ngi.learn.recorder import Recorder
 from ngi.learn.run import Run
 from ngi.learn.samples import Example, PatchSamples, Samples, network_of, patch_example
 from ngi.learn.schedule import ConstantRate, Schedule, WarmupStableDecay
 from ngi.learn.scorer import Scorer
-from ngi.learn.step import Learner, Step, training_step
+from ngi.learn.step import Learner, training_step
 from ngi.learn.step_guard import LARGEST_NORM, StepGuard
 from ngi.learn.stream import TrainingStream
 from ngi.learn.target_map import TargetMap
@@ -54,6 +55,7 @@ __all__ = [
     "Local",
     "MLflow",
     "ModelClock",
+    "Outcome",
     "PatchSamples",
     "PhaseClock",
     "RecordLog",

@@ -6,7 +6,7 @@ evaluated before its state is saved.
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from functools import partial
 from typing import Any
 
@@ -17,11 +17,14 @@ from ngi.clock.phase_events import PhaseEvents
 from ngi.files.run_folder import RunFolder
 from ngi.learn.learning_rate import LearningRate
 from ngi.learn.lightning_api import Callback, LightningModule, Trainer
+from ngi.learn.outcome import Outcome
 from ngi.learn.recorder import Recorder
 from ngi.learn.run import Run
 from ngi.learn.saving import BudgetAndCheckpoint
 from ngi.learn.stream import TrainingStream
 from ngi.learn.tracker import Tracker
+
+OUTCOME = [field.name for field in fields(Outcome)]
 
 
 class PhasesOnGpu(Callback):
@@ -64,13 +67,25 @@ class StepLog(Callback):
         row = {
             "step": self._stream.counters.iteration,
             "run_seconds": round(self._run_clock.run_seconds, 4),
-            **asdict(outputs["step"]),
+            **dict.fromkeys(OUTCOME),
             **self._stream.log_row(),
         }
-        self._folder.steps.append(row)
+        outputs["step"].when_known(partial(self._log, row))
         if self._stream.chain_record is not None:
             step = self._stream.counters.iteration
             self._folder.chains.append({"step": step, **self._stream.chain_record})
+
+    def _log(self, row: dict[str, Any], outcome: Outcome) -> None:
+        """row: of the end of the step, when it was perhaps not known yet what came of it."""
+        counters, store = self._stream.counters, self._stream.store
+        row |= {
+            **asdict(outcome),
+            "store_mean_loss": store.mean_loss,
+            "non_finite_losses": store.non_finite_losses,
+            "steps_refused": counters.steps_refused,
+            "steps_scaled": counters.steps_scaled,
+        }
+        self._folder.steps.append(row)
         self._tracker.step(row)
 
     def on_train_end(self, *_: Any) -> None:
@@ -111,7 +126,7 @@ class PeriodicEvaluation(Callback):
     def _evaluate_if_due(self) -> None:
         due = self._due
         if self._done < due < self._count:
-            self._run.stream.finish_rendering()
+            self._run.stream.catch_up()
             self._recorder.evaluate()
             self._done = due
 

@@ -1,4 +1,4 @@
-"""What the chains did at a generated batch, as a record of `chains.bin`."""
+"""What the chains did at a generated batch: a record of `chains.bin`, columns of steps.csv."""
 
 from __future__ import annotations
 
@@ -30,3 +30,13 @@ def chain_record(
     for name, target in (("target_proposed", target_proposed), ("target_current", target_current)):
         record[name] = unknown if target is None else target.float().numpy(force=True)
     return record
+
+
+def chain_row(info: ChainInfo | None) -> dict[str, float | None]:
+    """Of the same, what is logged with the step; None where no batch was generated."""
+    return {
+        "acceptance_rate": None if info is None else info.acceptance_rate,
+        "large_step_acceptance_rate": None if info is None else info.large_step_acceptance_rate,
+        "small_step_acceptance_rate": None if info is None else info.small_step_acceptance_rate,
+        "chain_mean_age": None if info is None else info.mean_age,
+    }

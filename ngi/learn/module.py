@@ -17,9 +17,11 @@ from ngi.learn.captured_pass import CapturedPass
 from ngi.learn.checkpoint import STEP_GUARD
 from ngi.learn.graph_trainer import GraphTrainer
 from ngi.learn.lightning_api import LightningModule
+from ngi.learn.outcome import Step
 from ngi.learn.samples import Example
 from ngi.learn.scorer import Scorer
-from ngi.learn.step import Learner, Step, training_step
+from ngi.learn.state_before import StateBefore
+from ngi.learn.step import Learner, training_step
 from ngi.learn.step_guard import StepGuard
 from ngi.learn.stream import TrainingStream
 from ngi.machine.captured import Captured, Function
@@ -137,8 +139,16 @@ class IlluminationModule(LightningModule):
     def _record(self) -> None:
         precision = self.trainer.precision_plugin.forward_context
         captured = CapturedPass(self.network, self.loss, precision=precision)
-        self.learner = replace(self.learner, captured=captured)
+        self.learner = replace(self.learner, captured=captured, before=self._before())
         self._image = Captured(self._rendered, module=self._shown, name="images")
+
+    def _before(self) -> StateBefore | None:
+        """Where there is a GPU that would have to be waited for."""
+        if self.device.type != "cuda":
+            return None
+        optimizer = self.optimizers(use_pl_optimizer=False)
+        assert isinstance(optimizer, torch.optim.Optimizer)
+        return StateBefore(network=self.network, averaged=self.averaged, optimizer=optimizer)
 
     @property
     def _shown(self) -> nn.Module:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import sys
 from typing import Any
 
@@ -11,6 +12,7 @@ from tqdm import tqdm
 from ngi.files.durable import DamagedError, write_atomically
 from ngi.learn.checkpoint import DECAYS_FROM, STREAM, read_checkpoint
 from ngi.learn.lightning_api import Callback, LightningModule, Trainer
+from ngi.learn.outcome import Outcome
 from ngi.learn.run import Run
 
 log = logging.getLogger(__name__)
@@ -37,6 +39,7 @@ class BudgetAndCheckpoint(Callback):
         self._saved_step = 0
         self._decays_from: int | None = None  # the step after which the schedule's decay began
         self._bar: tqdm[Any] | None = None
+        self._loss = math.nan  # the latest that is known
 
     def on_train_start(self, trainer: Trainer, *_: Any) -> None:
         used = self._run.budget_used
@@ -57,7 +60,8 @@ class BudgetAndCheckpoint(Callback):
     ) -> None:
         steps, seconds = self._run.stream.counters.iteration, self._run.clock.run_seconds
         used = self._run.budget_used
-        self._show(min(used, 1.0), outputs["step"].loss)
+        outputs["step"].when_known(self._know)
+        self._show(min(used, 1.0))
         periodic = self._every_steps is not None and steps % self._every_steps == 0
         decay_begins = self._decays_from is None and self._run.schedule.decays(used)
         if decay_begins:
@@ -65,7 +69,7 @@ class BudgetAndCheckpoint(Callback):
         due = periodic or seconds - self._saved_at >= self._every_seconds
         if used >= 1 or decay_begins or due:
             if used < 1:  # nobody waits for patches that no step follows
-                self._run.stream.finish_rendering()
+                self._run.stream.catch_up()
             self._save(trainer)
         if decay_begins:
             self._keep_stable()
@@ -88,11 +92,12 @@ class BudgetAndCheckpoint(Callback):
             log.warning("%s: interrupted, and saved at step %d", self._run.folder.path, step)
 
     def _save(self, trainer: Trainer) -> None:
+        self._run.stream.settle()
         with self._run.clock.phase("checkpoint"):
             for log_file in self._run.folder.logs:
                 log_file.flush()
             trainer.save_checkpoint(self._run.folder.checkpoint)
-            self._run.stream.prune_archive()
+            self._run.stream.saved_stores.prune()
         self._saved_at = self._run.clock.run_seconds
         self._saved_step = self._run.stream.counters.iteration
 
@@ -114,7 +119,7 @@ class BudgetAndCheckpoint(Callback):
             self._keep_stable()
         elif stable.exists():
             try:
-                self._run.stream.keep(read_checkpoint(stable)[STREAM])
+                self._run.stream.saved_stores.keep(read_checkpoint(stable)[STREAM]["store"])
             except DamagedError as error:
                 log.warning("%s; this run can not be trained longer later on", error)
 
@@ -122,13 +127,16 @@ class BudgetAndCheckpoint(Callback):
         with self._run.clock.phase("checkpoint"):
             content = self._run.folder.checkpoint.read_bytes()
             write_atomically(self._run.folder.stable_checkpoint, content)
-        self._run.stream.keep()
+        self._run.stream.saved_stores.keep()
 
-    def _show(self, used: float, loss: float) -> None:
+    def _know(self, outcome: Outcome) -> None:
+        self._loss = outcome.loss
+
+    def _show(self, used: float) -> None:
         assert self._bar is not None
         stream = self._run.stream
         self._bar.set_postfix_str(
-            f"step {stream.counters.iteration}, loss {loss:.4f}, "
+            f"step {stream.counters.iteration}, loss {self._loss:.4f}, "
             f"{stream.counters.patches_traced} patches traced, "
             f"reuse {stream.reuse_probability:.2f}",
             refresh=False,

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import torch
@@ -21,13 +22,18 @@ from torch.optim.swa_utils import AveragedModel
 from ngi.learn.batch import Batch, Feedback
 from ngi.learn.captured_pass import CapturedPass
 from ngi.learn.noise import noise_loss
-from ngi.learn.reading import read
+from ngi.learn.outcome import Outcome, Step
+from ngi.learn.reading import Reading
 from ngi.learn.samples import Example
 from ngi.learn.scorer import Scorer, Scores
+from ngi.learn.state_before import StateBefore
 from ngi.learn.step_guard import Attempt, StepGuard, gradient_norm, largest_moment
 from ngi.learn.stream import TrainingStream
 from ngi.models import SampleLoss
 from ngi.patches import Patches
+
+Queued = Callable[[], tuple[Attempt, Feedback]]
+"""The passes of a step that are under way; called, it gives what came of them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,6 +49,9 @@ class Learner:
     guard: refuses or scales down steps that would do harm
     stream: where batches come from, and who learns from each step
     captured: takes forward and backward pass of steps that score nothing; None for kernel by kernel
+    before: with it, steps whose losses no batch depends on (`TrainingStream.can_do_without`) are
+        taken before anybody has looked at them, and taken back where the guard would not have
+        admitted them. They are the same steps, and no device is waited for. None: all wait
     """
 
     network: nn.Module
@@ -53,24 +62,13 @@ class Learner:
     guard: StepGuard
     stream: TrainingStream
     captured: CapturedPass | None = None
+    before: StateBefore | None = None
 
     def losses(self, patches: Patches) -> tuple[Tensor, Tensor]:
         """Loss per sample [n], and what the network answered [n, H, W, 3]."""
         inputs, target = self.example(patches)
         prediction = self.network(*inputs)
         return self.loss(prediction, target), prediction
-
-
-@dataclass(frozen=True)
-class Step:
-    """What came of a step.
-
-    loss: mean over the batch, of the weighted losses
-    gradient_norm: L2 norm of the whole gradient, before the guard changed it
-    """
-
-    loss: float
-    gradient_norm: float
 
 
 def training_step(
@@ -86,35 +84,93 @@ def training_step(
     precision: the context that the network computes in; the rest is done in float32
     Raises FloatingPointError where the guard does (`StepGuard.admit`).
     """
-    clock = learner.stream.clock
-    with clock.phase("train"):
-        losses, loss, scores = _backward(batch, learner, optimizer, precision)
-        with clock.phase("score"):
-            asked = () if scores is None else (scores[0](), scores[1])
-            noise = () if batch.first_half is None else (noise_loss(learner.loss, batch),)
-        # The one time that a step waits for the device: its time is training's.
-        norms = gradient_norm(learner.network), largest_moment(optimizer)
-        told, mean, norm, moment, *others = read(losses, loss, *norms, *noise, *asked)
-        step = Step(float(mean), float(norm))
-        learner.guard.admit(
-            Attempt(
-                batch=batch,
-                losses=told,
-                loss=step.loss,
-                gradient_norm=step.gradient_norm,
-                largest_moment=float(moment),
-                network=learner.network,
-                optimizer=optimizer,
-            )
-        )
-        optimizer.step()  # does nothing where the guard has taken the gradient back
-        if learner.averaged is not None:
-            learner.averaged.update_parameters(learner.network)
+    number = learner.stream.counters.iteration + 1
+    queue = partial(_passes, batch, learner, precision, number)
+    if learner.before is not None and learner.stream.can_do_without(batch):
+        return _taken_unseen(batch, learner, learner.before, optimizer, queue)
+    step = Step()
+    with learner.stream.clock.phase("train"):
+        attempt, feedback = queue(optimizer)()  # the one time that the step waits for the device
+        learner.guard.admit(attempt)
+        _update(learner, optimizer)
     # The chains accept or refuse what they proposed; store and policy learn of the losses.
-    of_noise = others.pop(0) if noise else None
-    proposed, current = others or (None, None)
-    learner.stream.feedback(Feedback(told, proposed, current, of_noise))
+    learner.stream.feedback(feedback)
+    step.tell(Outcome(attempt.loss, attempt.gradient_norm))
     return step
+
+
+def _taken_unseen(
+    batch: Batch,
+    learner: Learner,
+    before: StateBefore,
+    optimizer: torch.optim.Optimizer,
+    queue: Callable[[torch.optim.Optimizer], Queued],
+) -> Step:
+    """As though the guard had admitted it. The step before is looked at, this one by the next."""
+    step, stream = Step(), learner.stream
+    with stream.clock.phase("train"):
+        queued, restorations = queue(optimizer), before.restorations
+        stream.settle()
+        if before.restorations > restorations:
+            queued = queue(optimizer)  # the weights are others now
+        before.keep()
+        _update(learner, optimizer)
+
+    def finish() -> None:
+        with stream.clock.phase("train"):
+            attempt, feedback = queued()
+            if learner.guard.admits(attempt):
+                learner.guard.admit(attempt)
+            else:
+                with before.restored():
+                    attempt, feedback = queue(before.optimizer)()
+                    learner.guard.admit(attempt)
+                    _update(learner, before.optimizer)
+        stream.learn(batch, feedback.losses)
+        step.tell(Outcome(attempt.loss, attempt.gradient_norm))
+
+    stream.feedback_later(finish)
+    return step
+
+
+def _passes(
+    batch: Batch,
+    learner: Learner,
+    precision: Callable[[], AbstractContextManager[Any]],
+    number: int,
+    optimizer: torch.optim.Optimizer,
+) -> Queued:
+    """Leaves the gradient of the step of this number."""
+    losses, loss, scores = _backward(batch, learner, optimizer, precision)
+    with learner.stream.clock.phase("score"):
+        asked = () if scores is None else (scores[0](), scores[1])
+        noise = () if batch.first_half is None else (noise_loss(learner.loss, batch),)
+    norms = gradient_norm(learner.network), largest_moment(optimizer)
+    reading = Reading(losses, loss, *norms, *noise, *asked)
+
+    def known() -> tuple[Attempt, Feedback]:
+        told, mean, norm, moment, *others = reading()
+        of_noise = others.pop(0) if noise else None
+        proposed, current = others or (None, None)
+        attempt = Attempt(
+            number=number,
+            batch=batch,
+            losses=told,
+            loss=float(mean),
+            gradient_norm=float(norm),
+            largest_moment=float(moment),
+            network=learner.network,
+            optimizer=optimizer,
+        )
+        return attempt, Feedback(told, proposed, current, of_noise)
+
+    return known
+
+
+def _update(learner: Learner, optimizer: torch.optim.Optimizer) -> None:
+    optimizer.step()  # does nothing where the guard has taken the gradient back
+    if learner.averaged is not None:
+        learner.averaged.update_parameters(learner.network)
 
 
 def _backward(

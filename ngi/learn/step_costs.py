@@ -47,6 +47,8 @@ def rendering_seconds(samples: Samples, *, count: int, seconds: float) -> Second
 class InTurn:
     """A reuse policy: a generated batch, a reused one, and so on."""
 
+    by_loss = True  # so that each step is waited for, and its time is its own
+
     def init(self) -> PolicyState:
         """See `ReusePolicy`; the losses stay unknown."""
         return PolicyState()

@@ -47,10 +47,12 @@ REFUSED_IN_A_ROW = 10
 class Attempt:
     """A step up to its backward pass.
 
+    number: of the step, from 1
     losses: [n] of the batch's samples, on the CPU; loss: their weighted mean
     gradient_norm: see the function of this name; largest_moment: likewise
     """
 
+    number: int
     batch: Batch
     losses: Tensor
     loss: float
@@ -58,6 +60,12 @@ class Attempt:
     largest_moment: float
     network: nn.Module
     optimizer: torch.optim.Optimizer
+
+    @property
+    def usable(self) -> bool:
+        """Whether weights and moments stay finite."""
+        finite = math.isfinite(self.largest_moment) and math.isfinite(self.loss)
+        return finite and self.gradient_norm <= LARGEST_NORM  # which is not so for NaN
 
     def content(self) -> dict[str, Any]:
         """What it takes to do it again."""
@@ -116,25 +124,47 @@ class StepGuard:
     def load_state_dict(self, state_dict: dict[str, Any]) -> None:
         self._log_norm = state_dict["log_norm"]
 
+    def admits(self, attempt: Attempt) -> bool:
+        """Whether the step is one to be taken, with its gradient as it is."""
+        return attempt.usable and self._factor(attempt.gradient_norm) is None
+
     def admit(self, attempt: Attempt) -> None:
-        """Between the backward pass and the optimiser's step.
+        """Between the backward pass and the optimiser's step, or later where it `admits` it.
 
         Raises FloatingPointError for one refusal too many.
         """
-        norm = attempt.gradient_norm
-        moments_usable = math.isfinite(attempt.largest_moment)
-        # `<=` is not so for NaN.
-        if norm <= LARGEST_NORM and moments_usable and math.isfinite(attempt.loss):
-            self._in_a_row = 0
-            self._scale_down(attempt.network, norm)
-        else:
-            self._refuse(attempt, _cause(attempt, norm, moments_usable=moments_usable))
+        if not attempt.usable:
+            self._refuse(attempt, _cause(attempt))
+            return
+        self._in_a_row = 0
+        factor = self._factor(attempt.gradient_norm)
+        self._follow(attempt.gradient_norm)
+        if factor is None:
+            return
+        self._stream.counters.steps_scaled += 1
+        for parameter in attempt.network.parameters():
+            if parameter.grad is not None:
+                parameter.grad.mul_(factor)
+
+    def _factor(self, norm: float) -> float | None:
+        """By which a gradient of this norm is scaled down to the average; None where it is not."""
+        if norm == 0 or self._log_norm is None:
+            return None
+        above = math.log(norm) - self._log_norm
+        return math.exp(-above) if above > math.log(OUTLIER) else None
+
+    def _follow(self, norm: float) -> None:
+        if norm == 0:
+            return
+        log_norm = math.log(norm)
+        average = log_norm if self._log_norm is None else self._log_norm
+        self._log_norm = average + (log_norm - average) / AVERAGED
 
     def _refuse(self, attempt: Attempt, cause: str) -> None:
         attempt.optimizer.zero_grad(set_to_none=True)
         self._in_a_row += 1
         self._stream.counters.steps_refused += 1
-        step = self._stream.counters.iteration + 1
+        step = attempt.number
         log.warning("step %d is not taken: %s", step, cause)
         if self._in_a_row < REFUSED_IN_A_ROW:
             return
@@ -145,30 +175,17 @@ class StepGuard:
             "optimizer.lr, in a new folder, since that is another run"
         )
 
-    def _scale_down(self, network: nn.Module, norm: float) -> None:
-        if norm == 0:
-            return
-        log_norm = math.log(norm)
-        average = log_norm if self._log_norm is None else self._log_norm
-        self._log_norm = average + (log_norm - average) / AVERAGED
-        if log_norm - average <= math.log(OUTLIER):
-            return
-        self._stream.counters.steps_scaled += 1
-        for parameter in network.parameters():
-            if parameter.grad is not None:
-                parameter.grad.mul_(math.exp(average - log_norm))
 
-
-def _cause(attempt: Attempt, norm: float, *, moments_usable: bool) -> str:
+def _cause(attempt: Attempt) -> str:
     """Of a step that is not taken."""
-    losses, batch = attempt.losses, attempt.batch
+    losses, batch, norm = attempt.losses, attempt.batch, attempt.gradient_norm
     broken = (~losses.isfinite()).nonzero().flatten().tolist()
     if broken:
         return (
             f"the loss of samples {broken} (patches {batch.ids[broken].tolist()} of the store) "
             f"is {losses[broken].tolist()}"
         )
-    if not moments_usable:
+    if not math.isfinite(attempt.largest_moment):
         return "the optimiser's moments hold NaN or Inf, which no gradient brought there"
     named = attempt.network.named_parameters(prefix="network")
     unusable = [name for name, parameter in named if not _usable(parameter.grad)]

@@ -4,13 +4,13 @@ This is where exploration, rendering and reuse meet (paper, Sec. 5 and 6.1). The
 handed to the renderer before it is decided whether the next batch is a new one; a renderer of
 several processes works on them while stored patches are trained on. The training step answers every
 batch with `feedback`; without it the next batch is refused, because chains and policy would run one
-step behind the network.
+step behind the network. Where they do not depend on it, `feedback_later` has it follow.
 """
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -21,9 +21,10 @@ from ngi.clock.phase_clock import PhaseClock
 from ngi.explore import ChainInfo, ChainState, ResolutionSchedule, Sampler
 from ngi.learn.ahead import ProposalsAhead
 from ngi.learn.batch import Batch, Feedback
-from ngi.learn.chain_trace import chain_record
+from ngi.learn.chain_trace import chain_record, chain_row
 from ngi.learn.noise import without_noise
 from ngi.learn.samples import Samples
+from ngi.learn.saved_stores import SavedStores
 from ngi.reuse import Reuse
 
 ENDLESS = 2**31
@@ -66,29 +67,23 @@ class TrainingStream:
             )
         self.sampler = sampler
         self.store = reuse.store
+        self.saved_stores = SavedStores(reuse.store, reuse.archive)
         self.clock = clock
         self.counters = Counters()
         self.reuse_probability = 0.0
         self.chain_record: dict[str, np.ndarray] | None = None  # of a generated batch
         self._chain_info: ChainInfo | None = None
         self._samples = samples
-        self._archive = reuse.archive
         self._policy = reuse.policy
         self._schedule = schedule
         self._when_late = reuse.when_late
         self._generator = torch.Generator().manual_seed(seed)
-        self._chains: ChainState = sampler.init(samples.dimensions + 2)
+        self.chains: ChainState = sampler.init(samples.dimensions + 2)  # where they stand
         self._policy_state = reuse.policy.init()
         self._resolution = schedule.resolution(0)  # of the latest proposals
         self._ahead: ProposalsAhead | None = None
-        self._saved_stores: list[dict[str, Any]] = []  # of the last two checkpoints
-        self._kept_stores: list[dict[str, Any]] = []  # of one that is kept beside them
         self._pending: Batch | None = None
-
-    @property
-    def chains(self) -> ChainState:
-        """Where the chains stand."""
-        return self._chains
+        self._finish: Callable[[], None] | None = None  # of the step that nobody has looked at
 
     def __iter__(self) -> Iterator[Batch]:
         while True:
@@ -99,14 +94,39 @@ class TrainingStream:
 
     def feedback(self, feedback: Feedback) -> None:
         """Lets chains, store and policy learn from the batch last given out."""
-        if self._pending is None:
-            raise RuntimeError("feedback without a batch")
-        batch, self._pending = self._pending, None
-        losses = feedback.losses.detach().float().cpu()
-        with self.clock.phase("explore"):
-            self._chain_info = self.chain_record = None
-            if batch.generated:
-                self._accept(batch, feedback, losses)
+        batch = self._answered()
+        if batch.generated:
+            with self.clock.phase("explore"):
+                self._accept(batch, feedback)
+        self.learn(batch, feedback.losses)
+
+    def can_do_without(self, batch: Batch) -> bool:
+        """Whether the batches that follow do not depend on the losses of this one."""
+        # Chains learn from generated batches only, drawing rule and policy from all.
+        return not (batch.generated or self.store.draws_by_loss or self._policy.by_loss)
+
+    def feedback_later(self, finish: Callable[[], None]) -> None:
+        """Answers the last batch without its losses. RuntimeError where they are needed at once.
+
+        finish: what is to be done once they are known, `learn` among it; `settle` calls it
+        """
+        if self._pending is not None and not self.can_do_without(self._pending):
+            raise RuntimeError("the next batch depends on the losses of this one; call feedback()")
+        self._answered()
+        self._finish = finish
+
+    def settle(self) -> None:
+        """Finishes the step that is not finished yet, if there is one.
+
+        It is called once the next step is queued, and before the store changes.
+        """
+        finish, self._finish = self._finish, None
+        if finish is not None:
+            finish()
+
+    def learn(self, batch: Batch, losses: torch.Tensor) -> None:
+        """Lets store and policy learn from a batch's losses [n]."""
+        losses = losses.detach().float().cpu()
         with self.clock.phase("reuse"):
             self.store.update(batch.ids.cpu(), losses)
             self._policy_state = self._policy.update(
@@ -115,20 +135,19 @@ class TrainingStream:
                 losses=losses,
                 large_step=batch.patches.large_step.cpu(),
             )
-        self.counters.iteration += 1
 
-    def finish_rendering(self) -> None:
-        """Waits, in run time, for patches that others render; call it before the clock pauses.
+    def catch_up(self) -> None:
+        """Waits, in run time, for the last step and for patches that others render.
 
-        They would go on rendering in time that does not count.
+        Call it before the clock pauses: they would go on in time that does not count.
         """
+        self.settle()
         if self._ahead is not None and self._ahead.late:
             with self.clock.phase("render"):
                 self._ahead.result()
 
     def log_row(self) -> dict[str, float | int | None]:
         """What the method did at this step: policy, store and chains; always the same keys."""
-        info = self._chain_info
         return {
             "reuse_probability": self.reuse_probability,
             "loss_new": self._policy_state.new_loss,
@@ -139,45 +158,30 @@ class TrainingStream:
             "non_finite_losses": self.store.non_finite_losses,
             "resolution": self._resolution,
             **vars(self.counters),
-            "acceptance_rate": None if info is None else info.acceptance_rate,
-            "large_step_acceptance_rate": None if info is None else info.large_step_acceptance_rate,
-            "small_step_acceptance_rate": None if info is None else info.small_step_acceptance_rate,
-            "chain_mean_age": None if info is None else info.mean_age,
+            **chain_row(self._chain_info),
         }
 
     def state_dict(self) -> dict[str, Any]:
         """Everything the next batch depends on; patches go to the archive, not in here."""
-        saved = self._archive.save(self.store)
-        self._saved_stores = [*self._saved_stores[-1:], saved]
+        if self._finish is not None:
+            raise RuntimeError("the last step is not finished; call settle() before it is saved")
         return {
             "counters": dict(vars(self.counters)),
-            "chains": self._chains.state_dict(),
+            "chains": self.chains.state_dict(),
             "policy": self._policy_state.state_dict(),
             "generator": self._generator.get_state(),
             "ahead": None if self._ahead is None else self._ahead.state_dict(),
-            "store": saved,
+            "store": self.saved_stores.save(),
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         self.counters = Counters(**state["counters"])
-        self._chains = type(self._chains).from_state_dict(state["chains"])
+        self.chains = type(self.chains).from_state_dict(state["chains"])
         self._policy_state = type(self._policy_state).from_state_dict(state["policy"])
         self._generator.set_state(state["generator"])
         ahead = state["ahead"]
         self._ahead = None if ahead is None else ProposalsAhead.from_state_dict(ahead)
-        self._archive.restore(self.store, state["store"])
-        self._saved_stores = [state["store"]]
-
-    def keep(self, state: dict[str, Any] | None = None) -> None:
-        """Keeps the patches of a saved state, by default the last, until this is called again."""
-        self._kept_stores = [self._saved_stores[-1] if state is None else state["store"]]
-
-    def prune_archive(self) -> None:
-        """Deletes patches that neither the last two saved states nor the kept one need.
-
-        Call it once the last one is on disk.
-        """
-        self._archive.prune([*self._saved_stores, *self._kept_stores])
+        self.saved_stores.restore(state["store"])
 
     def _next(self) -> Batch:
         ahead = self._propose()
@@ -209,7 +213,7 @@ class TrainingStream:
             with self.clock.phase("explore"):
                 self._ahead = ProposalsAhead(
                     self.sampler.propose(
-                        self._chains, self._generator, batch=self.counters.proposed_batches
+                        self.chains, self._generator, batch=self.counters.proposed_batches
                     ),
                     resolution=self._schedule.resolution(self.counters.iteration),
                     seed=int(torch.randint(2**31, (), generator=self._generator)),
@@ -224,14 +228,23 @@ class TrainingStream:
         self.counters.batches_postponed += postponed
         return postponed
 
+    def _answered(self) -> Batch:
+        if self._pending is None:
+            raise RuntimeError("feedback without a batch")
+        batch, self._pending = self._pending, None
+        self._chain_info = self.chain_record = None
+        self.counters.iteration += 1
+        return batch
+
     def _generate(self, ahead: ProposalsAhead) -> Batch:
         ahead = self._usable(ahead)
         self.counters.count_generated(ahead.result())
+        self.settle()
         with self.clock.phase("reuse"):
             ids = self.store.add(ahead.patches(), ahead.proposals.weight)
             patches = self.store.get(ids)  # in the precision of every later look at them
-            score_current = self.sampler.needs_current and bool(self._chains.occupied.all())
-            current = self.store.get(self._chains.patch) if score_current else None
+            score_current = self.sampler.needs_current and bool(self.chains.occupied.all())
+            current = self.store.get(self.chains.patch) if score_current else None
         self.counters.scored_batches += score_current
         return Batch(
             patches,
@@ -261,12 +274,13 @@ class TrainingStream:
             "usable patches of this scene"
         )
 
-    def _accept(self, batch: Batch, feedback: Feedback, losses: torch.Tensor) -> None:
+    def _accept(self, batch: Batch, feedback: Feedback) -> None:
         assert self._ahead is not None
+        losses = feedback.losses.detach().float().cpu()
         unscored = torch.zeros(self.sampler.chains)  # looked at by no rule
         proposed, current = feedback.target_proposed, feedback.target_current
-        self._chains, self._chain_info = self.sampler.accept(
-            self._chains,
+        self.chains, self._chain_info = self.sampler.accept(
+            self.chains,
             self._ahead.proposals,
             batch.ids,
             target_current=unscored if current is None else current,
@@ -281,4 +295,4 @@ class TrainingStream:
             target_current=current,
         )
         self._ahead = None
-        self.store.pin(self._chains.patch)
+        self.store.pin(self.chains.patch)

@@ -15,6 +15,11 @@ from torch import Tensor
 class DrawingRule(Protocol):
     """Draws from m stored patches, known by their slots 0 … m - 1; all tensors are on the CPU."""
 
+    @property
+    def by_loss(self) -> bool:
+        """Whether it looks at the losses."""
+        ...
+
     def draw(
         self, losses: Tensor, waiting: Tensor, count: int, generator: torch.Generator
     ) -> tuple[Tensor, Tensor]:
@@ -36,6 +41,8 @@ class ProportionalToLoss:
     With all losses 0 every patch is as likely.
     """
 
+    by_loss = True
+
     def draw(
         self, losses: Tensor, waiting: Tensor, count: int, generator: torch.Generator
     ) -> tuple[Tensor, Tensor]:
@@ -53,6 +60,8 @@ class Epochs:
     A batch that reaches beyond the end of an epoch is filled up from the next one. Patches that
     were added come with the next epoch, in the place of those they replaced at once.
     """
+
+    by_loss = False
 
     def draw(
         self, losses: Tensor, waiting: Tensor, count: int, generator: torch.Generator
@@ -84,6 +93,8 @@ class Prioritised:
     alpha: float
     beta: float
     epsilon: float
+
+    by_loss = True
 
     def __post_init__(self) -> None:
         for name, value in (("alpha", self.alpha), ("beta", self.beta)):

@@ -37,6 +37,11 @@ class PolicyState:
 class ReusePolicy(Protocol):
     """Gives the probability with which the next batch is a reused one."""
 
+    @property
+    def by_loss(self) -> bool:
+        """Whether it depends on the losses."""
+        ...
+
     def init(self) -> PolicyState:
         """The state at the start of a run."""
         ...
@@ -64,6 +69,8 @@ class ReusePolicy(Protocol):
 
 class _Stateless:
     """What the policies without averages share: they count, and look at no loss."""
+
+    by_loss = False
 
     def init(self) -> PolicyState:
         """See `ReusePolicy`."""
@@ -135,6 +142,8 @@ class SelfTuning:
     nothing. As in the release both start at the loss at the end of the bootstrap: during it they
     are the latest batch's loss. Until there is a loss at all, p_s is 0.
     """
+
+    by_loss = True
 
     def __init__(self, *, bootstrap_batches: int, beta: float, ema_coefficient: float) -> None:
         _check_bootstrap(bootstrap_batches)

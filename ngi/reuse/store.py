@@ -68,6 +68,11 @@ class PatchStore:
         return self._next_id
 
     @property
+    def draws_by_loss(self) -> bool:
+        """Whether it depends on the recorded losses which patches are drawn, or how they count."""
+        return self._rule.by_loss
+
+    @property
     def nbytes(self) -> int:
         """Bytes allocated for patches, ids and losses (the Python dictionary of ids is not in)."""
         return self._blocks.nbytes + self._ids.nbytes + self._losses.nbytes

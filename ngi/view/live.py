@@ -63,7 +63,7 @@ class LiveView(Callback):
         due = begin >= self._refresh_from
         if not (due or self._studio.waiting):
             return
-        self._run.stream.finish_rendering()
+        self._run.stream.catch_up()
         with self._run.clock.phase("evaluate"):
             if due:
                 self._studio.network_changed()

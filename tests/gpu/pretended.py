@@ -90,16 +90,32 @@ class Ledger:
     """What the host asked of the device: by file and line of the program, how often.
 
     waits: for results; uploads: copies of tensors to the device; launches: operators that compute
+    looks: at what was queued earlier, while the device goes on: events recorded after it, each time
     """
 
     waits: Counter[str] = field(default_factory=Counter)
-    waited: int = 0  # since the program began, however often it is cleared
     uploads: Counter[str] = field(default_factory=Counter)
     launches: Counter[str] = field(default_factory=Counter)
+    looks: list[int] = field(default_factory=list)
+    recorded: int = 0  # events since the program began, however often it is cleared
+    passed: int = 0  # of these, all that the host knows the device to be past
+    copies: list[tuple[int, Tensor, Tensor]] = field(default_factory=list)  # under way to the CPU
 
     def clear(self) -> None:
-        for counter in (self.waits, self.uploads, self.launches):
-            counter.clear()
+        for counts in (self.waits, self.uploads, self.launches, self.looks):
+            counts.clear()
+
+    def record(self) -> int:
+        """The number of the event."""
+        self.recorded += 1
+        return self.recorded
+
+    def pass_by(self, event: int) -> None:
+        """The device is past this event: what was copied before it is there."""
+        self.passed = max(self.passed, event)
+        for _, into, numbers in (copy for copy in self.copies if copy[0] < self.passed):
+            into.copy_(numbers)
+        self.copies = [copy for copy in self.copies if copy[0] >= self.passed]
 
 
 LEDGER = Ledger()
@@ -200,7 +216,8 @@ def _note_move(source: Tensor, to_gpu: bool, *, waits: bool) -> None:
     """waits: the caller has not said `non_blocking`. From memory that is not pinned that is so."""
     was = on(source)
     if was and not to_gpu:
-        waited()
+        if waits:
+            waited()
     elif to_gpu and not was:
         LEDGER.uploads[caller()] += 1
         if waits or not is_pinned(source) or TAPE:
@@ -243,7 +260,11 @@ class _Moved(torch.autograd.Function):
         ctx.was = on(tensor), tensor.dtype
         _note_move(tensor, to_gpu, waits=waits)
         numbers = plain(tensor.detach()).to(dtype, copy=True)
-        return OnGpu(numbers) if to_gpu else numbers
+        if waits or to_gpu:
+            return OnGpu(numbers) if to_gpu else numbers
+        under_way = torch.full_like(numbers, torch.nan)  # who reads it too early reads nonsense
+        LEDGER.copies.append((LEDGER.recorded, under_way, numbers))
+        return under_way
 
     @staticmethod
     def backward(  # type: ignore[override]
@@ -263,4 +284,4 @@ def waited() -> None:
     if TAPE:
         raise RuntimeError("CUDA error: operation not permitted when stream is capturing")
     LEDGER.waits[caller()] += 1
-    LEDGER.waited += 1
+    LEDGER.pass_by(LEDGER.record())

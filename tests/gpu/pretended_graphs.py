@@ -17,7 +17,7 @@ from torch import Tensor
 from torch.utils._python_dispatch import _disable_current_modes
 from torch.utils._pytree import tree_leaves
 
-from tests.gpu.pretended import LEDGER, TAPE
+from tests.gpu.pretended import LEDGER, TAPE, waited
 
 
 class Stream:
@@ -30,18 +30,30 @@ class Stream:
 
 
 class Event:
-    """Is passed once the host has waited for the device after it was recorded."""
+    """Is passed once the host has waited for it, or for the device, after it was recorded."""
 
     def __init__(self, *, enable_timing: bool = False) -> None:
-        assert enable_timing
+        self._timed = enable_timing
 
     def record(self) -> None:
-        self._seconds, self._waited = time.perf_counter(), LEDGER.waited
+        self._seconds, self._number = time.perf_counter(), LEDGER.record()
 
     def query(self) -> bool:
-        return LEDGER.waited > self._waited
+        return LEDGER.passed >= self._number
+
+    def synchronize(self) -> None:
+        """Where no event comes after it, the device has nothing to do until the host goes on."""
+        since = LEDGER.recorded - self._number
+        if self.query():
+            return
+        if since == 0:
+            waited()
+        else:
+            LEDGER.looks.append(since)
+            LEDGER.pass_by(self._number)
 
     def elapsed_time(self, end_event: Event) -> float:
+        assert self._timed
         if not (self.query() and end_event.query()):
             raise RuntimeError("CUDA error: device not ready")
         return 1e3 * (end_event._seconds - self._seconds)

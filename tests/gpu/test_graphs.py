@@ -125,13 +125,14 @@ def test_on_the_cpu_nothing_is_recorded(caplog: pytest.LogCaptureFixture) -> Non
 LONGER = ("budget.steps=24",)
 
 
-@pytest.mark.parametrize("name", ["paper, metropolis", "ours, exploring", "cnsr"])
+@pytest.mark.parametrize("name", ["paper, metropolis", "ours", "ours, exploring", "cnsr"])
 def test_a_run_of_graphs_is_the_same_bit_for_bit(gpu: Ledger, tmp_path: Path, name: str) -> None:
     options = (*RUNS[name], *LONGER)
     trained(tmp_path / "launched", *options, "trainer=fast")
     assert gpu.launches["graph"] == 0
     trained(tmp_path / "recorded", *options, "trainer=graphs")
     assert gpu.launches["graph"] > 8
+    assert (len(gpu.looks) > 4) == ("ours" in name)
     assert_same_run(tmp_path / "launched" / "run", tmp_path / "recorded" / "run")
 
 

@@ -13,8 +13,10 @@ import torch
 from ngi.explore import Loss, LossTimesOutputGradient, LossTimesStep, Target
 from ngi.learn import IlluminationModule, StepGuard, patch_example, seeded, training_step
 from ngi.learn.captured_pass import CapturedPass
+from ngi.learn.state_before import StateBefore
 from ngi.models import L1Dssim, MuonAdam, PixelGenerator, exponential_average
 from ngi.render import AnalyticRenderer
+from ngi.reuse import DrawingRule, Epochs
 from tests.gpu.pretended import Ledger
 from tests.learn.small_stream import make
 
@@ -22,13 +24,20 @@ OPTIMIZERS = {"adam": partial(torch.optim.Adam, lr=1e-3), "muon": MuonAdam}
 
 
 def waits(
-    folder: Path, ledger: Ledger, target: Target, optimizer_name: str, *, recorded: bool
+    folder: Path,
+    ledger: Ledger,
+    target: Target,
+    optimizer_name: str,
+    *,
+    recorded: bool,
+    late: bool = False,
+    rule: DrawingRule | None = None,
 ) -> dict[bool, list[Counter[str]]]:
     """By file, in each step after the first four; of generated batches and of stored ones.
 
-    The batch that a step is taken on is made in it too.
+    The batch that a step is taken on is made in it too. 'late' counts looks at the step before.
     """
-    stream = make(folder, target=target, device="cuda")
+    stream = make(folder, target=target, device="cuda", rule=rule)
     module = IlluminationModule(
         network=seeded(PixelGenerator, seed=0)(
             layout=AnalyticRenderer(dimensions=3, patch_size=8).layout,
@@ -48,6 +57,9 @@ def waits(
         captured = CapturedPass(module.network, module.loss, precision=nullcontext)
         learner = replace(learner, captured=captured)
     optimizer = module.configure_optimizers()
+    if late:
+        before = StateBefore(network=module.network, averaged=module.averaged, optimizer=optimizer)
+        learner = replace(learner, before=before)
     found: dict[bool, list[Counter[str]]] = {True: [], False: []}
     for number, batch in enumerate(islice(stream, 16)):
         training_step(batch.to("cuda"), learner, optimizer=optimizer)
@@ -55,7 +67,9 @@ def waits(
             files = Counter[str]()
             for place, count in ledger.waits.items():
                 files[place.partition(":")[0]] += count
-            found[batch.generated].append(files)
+            assert set(ledger.looks) <= {1}  # the passes of this step were queued before
+            files["late"] = len(ledger.looks)
+            found[batch.generated].append(+files)
             assert batch.generated or not ledger.uploads
         ledger.clear()
     return found
@@ -80,3 +94,20 @@ def test_a_step_waits_once(
         assert files == {"learn/reading.py": 1}
     for files in found[True]:  # whether patches are finite, traced and in half precision
         assert files == {"learn/reading.py": 2, "reuse/compact.py": 1}
+
+
+@pytest.mark.parametrize("optimizer", OPTIMIZERS)
+@pytest.mark.parametrize("recorded", [True, False])
+def test_a_step_on_stored_patches_does_not_wait_where_nothing_is_drawn_by_its_losses(
+    gpu: Ledger, tmp_path: Path, optimizer: str, recorded: bool
+) -> None:
+    found = waits(tmp_path, gpu, Loss(), optimizer, recorded=recorded, late=True, rule=Epochs())
+    assert {*map(str, found[False])} == {"Counter()", "Counter({'late': 1})"}
+    for files in found[True]:  # as any other
+        assert files == {"learn/reading.py": 2, "reuse/compact.py": 1}
+
+
+def test_where_patches_are_drawn_by_losses_it_waits_once(gpu: Ledger, tmp_path: Path) -> None:
+    found = waits(tmp_path, gpu, LossTimesStep(), "adam", recorded=True, late=True)
+    assert found[False]
+    assert all(files == {"learn/reading.py": 1} for files in found[False])

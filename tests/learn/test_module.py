@@ -131,7 +131,7 @@ def test_proposed_and_current_are_scored_under_the_same_weights(
         proposed, current = patches(4, 2 * step), patches(4, 2 * step + 1)
         expected = [direct_scores(made, target, p, optimizer) for p in (proposed, current)]
         batch = Batch(proposed, torch.arange(4), True, current)
-        loss = training_step(batch, made.learner, optimizer=optimizer).loss
+        loss = training_step(batch, made.learner, optimizer=optimizer).outcome.loss
         feedback = made.learner.stream.feedbacks[-1]  # type: ignore[attr-defined]
         torch.testing.assert_close(feedback.target_proposed.double(), expected[0])
         torch.testing.assert_close(feedback.target_current.double(), expected[1])

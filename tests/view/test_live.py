@@ -97,7 +97,7 @@ class Recorded:
         self.gui = self.chains = self.store = None
         self.chain_record = None
 
-    def finish_rendering(self) -> None:
+    def catch_up(self) -> None:
         self.calls.append("finish")
 
     def work(self, *, wait: float) -> bool:

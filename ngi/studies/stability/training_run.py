@@ -217,8 +217,8 @@ class _Watch(Callback):
             self._disturbances.before_step(self._step, module.network, trainer.optimizers[0])
 
     def on_train_batch_end(self, _trainer: Trainer, _module: Any, outputs: Any, *_: Any) -> None:
-        self._trained.losses.append(outputs["step"].loss)
-        self._trained.gradient_norms.append(outputs["step"].gradient_norm)
+        self._trained.losses.append(outputs["step"].outcome.loss)
+        self._trained.gradient_norms.append(outputs["step"].outcome.gradient_norm)
         if self._stream.chain_record is not None:
             accepted = torch.from_numpy(self._stream.chain_record["accepted"])
             self._stays = torch.where(accepted, 0, self._stays + 1)
