@@ -8,12 +8,13 @@ import torch
 from torch import Tensor, nn
 
 from ngi.learn.graph_trainer import GraphTrainer
+from ngi.learn.step_guard import Attempt, StepGuard
 from ngi.machine.captured import MOST, Captured
 from ngi.view.trained_run import RECORDS, TrainedRun
 from tests.gpu.pretended import DEVICE, Ledger
 from tests.gpu.test_runs import RUNS, trained
 from tests.learn.command_line import SMALL
-from tests.learn.comparison import assert_same_run
+from tests.learn.comparison import assert_same, assert_same_run, final_state
 from tests.learn.lightning_warnings import IGNORED, RESUMED
 
 pytestmark = [*IGNORED, RESUMED]
@@ -134,6 +135,36 @@ def test_a_run_of_graphs_is_the_same_bit_for_bit(gpu: Ledger, tmp_path: Path, na
     assert gpu.launches["graph"] > 8
     assert (len(gpu.looks) > 4) == ("ours" in name)
     assert_same_run(tmp_path / "launched" / "run", tmp_path / "recorded" / "run")
+
+
+def test_steps_that_are_taken_back_and_again_are_the_same(
+    gpu: Ledger, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever is the reason: here there is none."""
+    options = (*RUNS["ours"], *LONGER)
+    trained(tmp_path / "at once", *options, "trainer=fast")
+    asked = []
+
+    def admits(_: StepGuard, attempt: Attempt) -> bool:
+        asked.append(attempt.number)
+        return attempt.number % 3 > 0
+
+    monkeypatch.setattr(StepGuard, "admits", admits)
+    trained(tmp_path / "again", *options, "trainer=graphs", "run.checkpoint_steps=5")
+    assert len(asked) > 10
+    assert len(gpu.looks) > 4
+    assert_same_run(tmp_path / "at once" / "run", tmp_path / "again" / "run")
+
+
+@pytest.mark.usefixtures("gpu")
+def test_a_run_whose_steps_are_looked_at_late_goes_on_as_an_unbroken_one(tmp_path: Path) -> None:
+    ours = (o for o in RUNS["ours"] if not o.startswith("schedule"))
+    options = (*ours, "schedule=constant", *LONGER)
+    trained(tmp_path / "unbroken", *options, "trainer=fast")
+    for steps in (9, 16, 24):
+        trained(tmp_path / "longer", *options, "trainer=graphs", f"budget.steps={steps}")
+    states = [final_state(tmp_path / name / "run") for name in ("unbroken", "longer")]
+    assert_same(*states)
 
 
 def test_without_a_gpu_it_is_the_same_as_without_graphs(tmp_path: Path) -> None:

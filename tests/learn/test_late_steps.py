@@ -159,6 +159,21 @@ def test_saved_in_between_it_goes_on_as_one_that_is_not(tmp_path: Path, stored: 
     assert_same(final, expected)
 
 
+def test_before_the_clock_pauses_the_last_step_is_looked_at(
+    tmp_path: Path, stored: list[int]
+) -> None:
+    """An evaluation is not to see weights that are taken back."""
+    numbers: Known = {}
+    Training(tmp_path, late=False, numbers=numbers).run(STEPS)
+    training = Training(tmp_path, late=True, numbers=numbers, harm=Harm(gradient={stored[4]: NAN}))
+    training.run(stored[4])
+    network = training.module.network
+    assert not all(p.isfinite().all() for p in network.parameters())
+    training.stream.catch_up()
+    assert all(p.isfinite().all() for p in network.parameters())
+    assert training.outcomes[-1][0] == stored[4]
+
+
 POLICIES: dict[str, ReusePolicy] = {
     "never": Never(),
     "until full": UntilFull(),

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from ngi.learn import Budget, Interruption, PhaseClock, Run, Step, TrainingStream
+from ngi.learn import Budget, Interruption, Outcome, PhaseClock, Run, Step, TrainingStream
 from ngi.learn.callbacks import PeriodicEvaluation
 from ngi.learn.saving import BudgetAndCheckpoint
 from ngi.learn.schedule import ConstantRate
@@ -78,7 +78,9 @@ def test_a_checkpoint_waits_for_patches_unless_the_run_is_over(
     )
     callback.on_train_start(trainer)
     module: Any = None
-    callback.on_train_batch_end(trainer, module, {"step": Step(loss=1.0, gradient_norm=1.0)})
+    step = Step()
+    step.tell(Outcome(loss=1.0, gradient_norm=1.0))
+    callback.on_train_batch_end(trainer, module, {"step": step})
     callback.on_train_end()
     assert seen == [waits]
     assert clock.run_seconds == (5 if waits else 0)
