@@ -1,6 +1,7 @@
 """What is recorded as a CUDA graph comes to what is launched kernel by kernel."""
 
 import logging
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ from torch import Tensor, nn
 
 from ngi.learn.graph_trainer import GraphTrainer
 from ngi.learn.step_guard import Attempt, StepGuard
+from ngi.learn.stream import TrainingStream
 from ngi.machine.captured import MOST, Captured
 from ngi.view.trained_run import RECORDS, TrainedRun
 from tests.gpu.pretended import DEVICE, Ledger
@@ -126,6 +128,12 @@ def test_on_the_cpu_nothing_is_recorded(caplog: pytest.LogCaptureFixture) -> Non
 LONGER = ("budget.steps=24",)
 
 
+def of_constant_rate(name: str) -> tuple[str, ...]:
+    """The options of a run that is longer, and goes on to any length."""
+    others = (option for option in RUNS[name] if not option.startswith("schedule"))
+    return (*others, "schedule=constant", *LONGER)
+
+
 @pytest.mark.parametrize("name", ["paper, metropolis", "ours", "ours, exploring", "cnsr"])
 def test_a_run_of_graphs_is_the_same_bit_for_bit(gpu: Ledger, tmp_path: Path, name: str) -> None:
     options = (*RUNS[name], *LONGER)
@@ -135,6 +143,26 @@ def test_a_run_of_graphs_is_the_same_bit_for_bit(gpu: Ledger, tmp_path: Path, na
     assert gpu.launches["graph"] > 8
     assert (len(gpu.looks) > 4) == ("ours" in name)
     assert_same_run(tmp_path / "launched" / "run", tmp_path / "recorded" / "run")
+
+
+@pytest.mark.parametrize("name", ["ours", "ours, exploring"])
+def test_in_such_a_run_steps_on_stored_patches_wait_for_nothing(
+    gpu: Ledger, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    """Lightning, logs and batches included."""
+    answered: dict[int, int] = {}  # by step, how often the host had waited by then
+    feedback_later = TrainingStream.feedback_later
+
+    def noted(stream: TrainingStream, finish: Callable[[], None]) -> None:
+        feedback_later(stream, finish)
+        answered[stream.counters.iteration] = gpu.waits.total()
+
+    monkeypatch.setattr(TrainingStream, "feedback_later", noted)
+    options = (*of_constant_rate(name), "evaluation.count=1")  # saved and evaluated at the end only
+    trained(tmp_path, *options, "trainer=graphs")
+    between = [answered[step + 1] - answered[step] for step in answered if step + 1 in answered]
+    assert len(between) > 8
+    assert not any(between)
 
 
 def test_steps_that_are_taken_back_and_again_are_the_same(
@@ -158,8 +186,7 @@ def test_steps_that_are_taken_back_and_again_are_the_same(
 
 @pytest.mark.usefixtures("gpu")
 def test_a_run_whose_steps_are_looked_at_late_goes_on_as_an_unbroken_one(tmp_path: Path) -> None:
-    ours = (o for o in RUNS["ours"] if not o.startswith("schedule"))
-    options = (*ours, "schedule=constant", *LONGER)
+    options = of_constant_rate("ours")
     trained(tmp_path / "unbroken", *options, "trainer=fast")
     for steps in (9, 16, 24):
         trained(tmp_path / "longer", *options, "trainer=graphs", f"budget.steps={steps}")
