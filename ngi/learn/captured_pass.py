@@ -17,7 +17,7 @@ from ngi.models import SampleLoss
 class CapturedPass:
     """Forward and backward pass of steps that score nothing, recorded once (`Captured`).
 
-    The graph ends where the host has to know the losses: the guard decides whether the step is
+    The graph ends where the host may have to know the losses: the guard decides whether the step is
     taken. The optimiser's step is not part of it, since its learning rate, which changes from step
     to step, is a number of the host's, and would be recorded with it.
 
