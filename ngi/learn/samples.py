@@ -105,6 +105,7 @@ class PatchSamples:
         self.dimensions = renderer.dimensions
         self.patch_size = renderer.patch_size
         left_out = slice(0, 0) if camera else renderer.camera_part
+        self._seen = slice(0, left_out.start), slice(left_out.stop, self.dimensions)
         self.components = [i for i in range(self.dimensions) if i not in _indices(left_out)]
         self.network_arguments = {
             "layout": self.layout,
@@ -154,7 +155,8 @@ class PatchSamples:
     def _of(self, scene_vectors: Tensor) -> Tensor:
         if len(self.components) == self.dimensions:
             return scene_vectors
-        return scene_vectors[..., self.components]
+        # By slices: a GPU would be waited for with a list of indices, which is uploaded.
+        return torch.cat([scene_vectors[..., part] for part in self._seen], dim=-1)
 
 
 def network_of(samples: Samples, make: Callable[..., nn.Module]) -> nn.Module:

@@ -145,9 +145,14 @@ def test_a_run_of_graphs_is_the_same_bit_for_bit(gpu: Ledger, tmp_path: Path, na
     assert_same_run(tmp_path / "launched" / "run", tmp_path / "recorded" / "run")
 
 
-@pytest.mark.parametrize("name", ["ours", "ours, exploring"])
+CAMERA = ("renderer._target_=tests.learn.moving_camera.moving_camera",)
+
+
+@pytest.mark.parametrize(
+    ("name", "others"), [("ours", ()), ("ours", CAMERA), ("ours, exploring", ())]
+)
 def test_in_such_a_run_steps_on_stored_patches_wait_for_nothing(
-    gpu: Ledger, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+    gpu: Ledger, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, others: tuple[str, ...]
 ) -> None:
     """Lightning, logs and batches included."""
     answered: dict[int, int] = {}  # by step, how often the host had waited by then
@@ -158,7 +163,11 @@ def test_in_such_a_run_steps_on_stored_patches_wait_for_nothing(
         answered[stream.counters.iteration] = gpu.waits.total()
 
     monkeypatch.setattr(TrainingStream, "feedback_later", noted)
-    options = (*of_constant_rate(name), "evaluation.count=1")  # saved and evaluated at the end only
+    options = (
+        *of_constant_rate(name),
+        *others,
+        "evaluation.count=1",
+    )  # saved and evaluated at the end only
     trained(tmp_path, *options, "trainer=graphs")
     between = [answered[step + 1] - answered[step] for step in answered if step + 1 in answered]
     assert len(between) > 8
