@@ -1,6 +1,6 @@
 """Production denoisers of path-traced images, and training patches whose noise they take off."""
 
-from ngi.denoise.denoised_job import DenoisedJob
 from ngi.denoise.denoisers import Denoiser, OpenImageDenoise, OptixDenoise, guides
+from ngi.denoise.patches import denoised
 
-__all__ = ["DenoisedJob", "Denoiser", "OpenImageDenoise", "OptixDenoise", "guides"]
+__all__ = ["Denoiser", "OpenImageDenoise", "OptixDenoise", "denoised", "guides"]

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Container
+from functools import partial
 from typing import Any, Protocol
 
 import torch
 from torch import Tensor, nn
 
-from ngi.denoise.denoised_job import DenoisedJob
-from ngi.denoise.denoisers import Denoiser
-from ngi.learn.halves import HalvesJob
+from ngi.denoise import Denoiser, denoised
+from ngi.learn.halves import mean_of_halves
 from ngi.patches import BufferLayout, Patches
-from ngi.render.protocol import PatchJob, Renderer
+from ngi.render.protocol import Deferred, PatchJob, Renderer
 from ngi.render.tracing import derive_seed
 
 Example = tuple[tuple[Tensor, ...], Tensor]
@@ -78,7 +78,7 @@ class PatchSamples:
         paper. The radiance that leaves a point in a direction does not depend on them, and the
         buffers say where the point is and which direction
     denoiser: takes the noise off newly traced radiance, or None
-    traced_share: see `DenoisedJob`
+    traced_share: see `ngi.denoise.denoised`
     halves: whether each patch is the mean of two renderings, so that its noise is known
         (`ngi.learn.noise`); the renderer's samples per pixel are then those of each
 
@@ -98,10 +98,13 @@ class PatchSamples:
         if not 0 <= traced_share <= 1:
             raise ValueError(f"data.traced_share is {traced_share}; expected 0 to 1")
         self._renderer = renderer
-        self._denoiser = denoiser
-        self._traced_share = traced_share
         self._halves = halves
         self.layout = renderer.layout
+        self._denoise = None
+        if denoiser is not None:
+            self._denoise = partial(
+                denoised, denoiser=denoiser, traced_share=traced_share, layout=self.layout
+            )
         self.dimensions = renderer.dimensions
         self.patch_size = renderer.patch_size
         left_out = slice(0, 0) if camera else renderer.camera_part
@@ -126,12 +129,9 @@ class PatchSamples:
         job = self._renderer.start_patches(states, resolution=resolution, seed=seed)
         if self._halves:
             other = derive_seed(seed, b"second half")
-            job = HalvesJob(
-                job, self._renderer.start_patches(states, resolution=resolution, seed=other)
-            )
-        if self._denoiser is None:
-            return job
-        return DenoisedJob(job, self._denoiser, traced_share=self._traced_share, layout=self.layout)
+            second = self._renderer.start_patches(states, resolution=resolution, seed=other)
+            job = Deferred(mean_of_halves, job, second)
+        return job if self._denoise is None else Deferred(self._denoise, job)
 
     def blank(self, count: int) -> Patches:
         """See `Samples.blank`."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 from torch import Tensor
@@ -46,19 +47,24 @@ class PatchJob(Protocol):
 
 
 class Deferred:
-    """The `PatchJob` of a renderer that works in this process: it renders when it is asked."""
+    """The `PatchJob` whose patches this process makes when they are asked for.
 
-    def __init__(self, render: Callable[[], RenderedPatches]) -> None:
-        self._render = render
-        self._result: RenderedPatches | None = None
+    others: jobs of what they are made of; `make` is given their results, in order
+    """
+
+    def __init__(self, make: Callable[..., RenderedPatches], *others: PatchJob) -> None:
+        self._make = make
+        self._others = others
 
     def done(self) -> bool:
-        return True
+        return all(job.done() for job in self._others)
 
     def result(self) -> RenderedPatches:
-        if self._result is None:
-            self._result = self._render()
         return self._result
+
+    @cached_property
+    def _result(self) -> RenderedPatches:
+        return self._make(*(job.result() for job in self._others))
 
 
 class Renderer(Protocol):

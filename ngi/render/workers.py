@@ -5,14 +5,13 @@ from __future__ import annotations
 import pickle
 import weakref
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future
-from functools import cached_property, partial
+from functools import partial
 from typing import Any, Self
 
 import torch
 from torch import Tensor
 
-from ngi.render.protocol import RenderedPatches, Renderer
+from ngi.render.protocol import Deferred, RenderedPatches, Renderer
 from ngi.render.render_inputs import check_states, patch_window
 from ngi.render.worker_pool import WorkerPool
 from ngi.render.worker_process import WorkerProcess
@@ -89,7 +88,7 @@ class WorkerRenderer:
         """See `ngi.render.Renderer.render_patches`."""
         return self.start_patches(states, resolution=resolution, seed=seed).result()
 
-    def start_patches(self, states: Tensor, *, resolution: int, seed: int) -> ChunkedJob:
+    def start_patches(self, states: Tensor, *, resolution: int, seed: int) -> Deferred:
         """See `ngi.render.Renderer.start_patches`; what is wrong with states is raised here."""
         check_states(states, self.dimensions)
         for state in states:
@@ -97,7 +96,7 @@ class WorkerRenderer:
         chunks = states.split(list(chunk_sizes(len(states), self._workers)))
         # Copies: a pickled view would take the whole batch with it.
         requests = [Request(chunk.clone(), resolution, seed) for chunk in chunks]
-        return ChunkedJob(self._pool.submit(requests))
+        return Deferred(_joined, *self._pool.submit(requests))
 
     def render_image(
         self, scene_vector: Tensor, *, resolution: int, samples_per_pixel: int, seed: int
@@ -148,30 +147,15 @@ def _starter(make: bytes, *, workers: int, cluster: str | None) -> Callable[[int
     return partial(RayWorker, share=join_cluster(cluster, workers=workers), make=make)
 
 
-class ChunkedJob:
-    """The `PatchJob` of a batch that is rendered in chunks."""
-
-    def __init__(self, chunks: list[Future[RenderedPatches]]) -> None:
-        self._chunks = chunks
-
-    def done(self) -> bool:
-        """See `PatchJob.done`."""
-        return all(chunk.done() for chunk in self._chunks)
-
-    def result(self) -> RenderedPatches:
-        """See `PatchJob.result`."""
-        return self._joined
-
-    @cached_property
-    def _joined(self) -> RenderedPatches:
-        parts = [chunk.result() for chunk in self._chunks]
-        return RenderedPatches(
-            buffers=torch.cat([part.buffers for part in parts]),
-            log_radiance=torch.cat([part.log_radiance for part in parts]),
-            repaired=sum(part.repaired for part in parts),
-            masked=sum(part.masked for part in parts),
-            paths=sum(part.paths for part in parts),
-        )
+def _joined(*chunks: RenderedPatches) -> RenderedPatches:
+    """A batch that was rendered in chunks."""
+    return RenderedPatches(
+        buffers=torch.cat([chunk.buffers for chunk in chunks]),
+        log_radiance=torch.cat([chunk.log_radiance for chunk in chunks]),
+        repaired=sum(chunk.repaired for chunk in chunks),
+        masked=sum(chunk.masked for chunk in chunks),
+        paths=sum(chunk.paths for chunk in chunks),
+    )
 
 
 def chunk_sizes(patches: int, workers: int) -> Iterator[int]:

@@ -4,11 +4,10 @@ import pytest
 import torch
 from torch import nn
 
-from ngi.denoise import DenoisedJob
+from ngi.denoise import denoised
 from ngi.learn import PatchSamples, network_of, seeded
 from ngi.patches import BufferLayout, MovingPoints
 from ngi.render import AnalyticRenderer
-from ngi.render.protocol import Deferred
 
 from .moving_camera import SCENE_VARIABLES, MovingCamera
 
@@ -68,13 +67,13 @@ def test_of_a_denoised_patch_only_the_traced_share_is_noise() -> None:
 def test_negative_radiance_of_a_denoiser_is_none() -> None:
     renderer = AnalyticRenderer(dimensions=1, patch_size=16)
     traced = renderer.render_patches(states(renderer), resolution=64, seed=1)
-    job = DenoisedJob(
-        Deferred(lambda: traced),
-        lambda radiance, *_: radiance - 100,
+    result = denoised(
+        traced,
+        denoiser=lambda radiance, *_: radiance - 100,
         traced_share=0.0,
         layout=BufferLayout(),
     )
-    assert (job.result().log_radiance == 0).all()
+    assert (result.log_radiance == 0).all()
 
 
 def test_a_share_that_is_none_is_named() -> None:

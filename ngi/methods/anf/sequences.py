@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 
 import torch
 from torch import Tensor
 
 from ngi.learn.samples import Example
 from ngi.patches import Patches
-from ngi.render.protocol import PatchJob, RenderedPatches, Renderer
+from ngi.render.protocol import Deferred, PatchJob, RenderedPatches, Renderer
 from ngi.render.render_inputs import check_states, patch_window
 from ngi.render.tracing import derive_seed
 
@@ -73,7 +74,7 @@ class Sequences:
             )
             for rendering in range(1 + self._target_renderings)
         ]
-        return _SequenceJob(jobs, frames=self._frames)
+        return Deferred(partial(_sequences, frames=self._frames), *jobs)
 
     def blank(self, count: int) -> Patches:
         """See `Samples.blank`."""
@@ -172,26 +173,14 @@ def _finite(radiance: Tensor) -> Tensor:
     return radiance.where(radiance.isfinite().all(dim=-1, keepdim=True), 0)
 
 
-@dataclass(frozen=True)
-class _SequenceJob:
-    """The renderings of all frames on their way to being sequences; the first is the noisy one."""
-
-    jobs: list[PatchJob]
-    frames: int
-
-    def done(self) -> bool:
-        """See `PatchJob.done`."""
-        return all(job.done() for job in self.jobs)
-
-    def result(self) -> RenderedPatches:
-        """See `PatchJob.result`."""
-        noisy, *others = [job.result() for job in self.jobs]
-        mean = torch.stack([torch.expm1(other.log_radiance) for other in others]).mean(dim=0)
-        pair = torch.stack([noisy.log_radiance, torch.log1p(mean)])
-        return RenderedPatches(
-            buffers=noisy.buffers.unflatten(0, (-1, self.frames)),
-            log_radiance=pair.unflatten(1, (-1, self.frames)).transpose(0, 1).contiguous(),
-            repaired=sum(rendered.repaired for rendered in (noisy, *others)),
-            masked=sum(rendered.masked for rendered in (noisy, *others)),
-            paths=sum(rendered.paths for rendered in (noisy, *others)),
-        )
+def _sequences(noisy: RenderedPatches, *others: RenderedPatches, frames: int) -> RenderedPatches:
+    """Of renderings of all frames."""
+    mean = torch.stack([torch.expm1(other.log_radiance) for other in others]).mean(dim=0)
+    pair = torch.stack([noisy.log_radiance, torch.log1p(mean)])
+    return RenderedPatches(
+        buffers=noisy.buffers.unflatten(0, (-1, frames)),
+        log_radiance=pair.unflatten(1, (-1, frames)).transpose(0, 1).contiguous(),
+        repaired=sum(rendered.repaired for rendered in (noisy, *others)),
+        masked=sum(rendered.masked for rendered in (noisy, *others)),
+        paths=sum(rendered.paths for rendered in (noisy, *others)),
+    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import torch
 from torch import Tensor
@@ -10,7 +10,7 @@ from torch.quasirandom import SobolEngine
 
 from ngi.learn.samples import Example
 from ngi.patches import Patches
-from ngi.render.protocol import PatchJob, RenderedPatches, Renderer
+from ngi.render.protocol import Deferred, PatchJob, RenderedPatches, Renderer
 from ngi.render.render_inputs import check_states
 
 TEST_SEED = 0
@@ -58,7 +58,15 @@ class ObservationSets:
         job = self._renderer.start_patches(
             _placed(views, states[:, -2:]).flatten(0, 1), resolution=resolution, seed=seed
         )
-        return _SetJob(job, images=views.shape[1])
+
+        def sets(rendered: RenderedPatches) -> RenderedPatches:
+            buffers, log_radiance = (
+                images.unflatten(0, (-1, views.shape[1]))
+                for images in (rendered.buffers, rendered.log_radiance)
+            )
+            return replace(rendered, buffers=buffers, log_radiance=log_radiance)
+
+        return Deferred(sets, job)
 
     def blank(self, count: int) -> Patches:
         """See `Samples.blank`."""
@@ -120,24 +128,3 @@ def _placed(views: Tensor, position: Tensor) -> Tensor:
     images = views.shape[1]
     index = torch.arange(images)[None, :, None]
     return torch.cat([views, (index + position[:, None]) / images], dim=-1)
-
-
-@dataclass(frozen=True)
-class _SetJob:
-    """The images of sets, one after the other, on their way to being sets."""
-
-    job: PatchJob
-    images: int
-
-    def done(self) -> bool:
-        """See `PatchJob.done`."""
-        return self.job.done()
-
-    def result(self) -> RenderedPatches:
-        """See `PatchJob.result`."""
-        rendered = self.job.result()
-        return replace(
-            rendered,
-            buffers=rendered.buffers.unflatten(0, (-1, self.images)),
-            log_radiance=rendered.log_radiance.unflatten(0, (-1, self.images)),
-        )
