@@ -27,7 +27,7 @@ class Acceptance(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Greedy:
+class Greedy(Acceptance):
     """Accepts only what improves the target (paper, Sec. 5.1, Eq. 4): p(v) > p(u).
 
     The target of a state falls as the network learns from it, which is what lets a chain leave it.
@@ -45,13 +45,12 @@ class Greedy:
         target_current: Tensor,
         generator: torch.Generator,
     ) -> Tensor:
-        """See `Acceptance`."""
         if self.accept_equal:
             return target_proposed >= target_current
         return target_proposed > target_current
 
 
-class Metropolis:
+class Metropolis(Acceptance):
     """Accepts with probability min(1, p(v) / p(u)) (paper, Sec. 5.1, Eq. 3).
 
     A state of target 0 is left for any other, also for one of target 0, as a chain must not stay
@@ -63,7 +62,7 @@ class Metropolis:
     def __call__(
         self, target_proposed: Tensor, target_current: Tensor, generator: torch.Generator
     ) -> Tensor:
-        """See `Acceptance`. Raises ValueError for a negative target."""
+        """Raises ValueError for a negative target."""
         if (target_proposed < 0).any() or (target_current < 0).any():
             raise ValueError(
                 f"Metropolis acceptance: a target is negative (proposed "
@@ -80,7 +79,7 @@ class Metropolis:
         return (xi * target_current < target_proposed) | (target_current == 0)
 
 
-class Always:
+class Always(Acceptance):
     """Accepts everything: with large steps only, the paper's uniform baseline (Sec. 7.2)."""
 
     needs_current = False
@@ -91,5 +90,4 @@ class Always:
         target_current: Tensor,
         generator: torch.Generator,
     ) -> Tensor:
-        """See `Acceptance`."""
         return torch.ones_like(target_proposed, dtype=torch.bool)

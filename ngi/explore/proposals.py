@@ -55,7 +55,7 @@ def wrap(position: Tensor) -> Tensor:
 
 
 @dataclass(frozen=True, kw_only=True)
-class NormalPerturbation:
+class NormalPerturbation(ProposalDistribution):
     """Small steps perturb every component by a normal variate (paper, Sec. 5.1).
 
     large_step_probability: probability that a chain jumps to a uniformly drawn state (paper,
@@ -82,7 +82,6 @@ class NormalPerturbation:
             )
 
     def propose(self, position: Tensor, generator: torch.Generator, *, batch: int) -> Proposals:
-        """See `ProposalDistribution.propose`."""
         normal = torch.empty_like(position).normal_(generator=generator)
         return _mix(
             wrap(position + self.standard_deviation * normal),
@@ -92,7 +91,7 @@ class NormalPerturbation:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ExponentialPerturbation:
+class ExponentialPerturbation(ProposalDistribution):
     """Small steps move every component by +-s2 exp(-ln(s2 / s1) xi), xi uniform in [0, 1).
 
     This is the release's perturbation, that of Kelemen et al. (2002), wrapped around at 0 and 1:
@@ -119,7 +118,6 @@ class ExponentialPerturbation:
             )
 
     def propose(self, position: Tensor, generator: torch.Generator, *, batch: int) -> Proposals:
-        """See `ProposalDistribution.propose`."""
         xi = torch.empty_like(position).uniform_(generator=generator)
         size = self.largest * torch.exp(-math.log(self.largest / self.smallest) * xi)
         forward = torch.empty_like(position).uniform_(generator=generator) < 0.5

@@ -13,7 +13,7 @@ class ResolutionSchedule(Protocol):
         ...
 
 
-class GrowingResolution:
+class GrowingResolution(ResolutionSchedule):
     """Starts at `start` pixels and grows by `step` every `every` iterations, up to `end`.
 
     The paper (Sec. 6.2) starts at 128 and grows by 4 every 2,000 iterations up to 600, which it
@@ -33,7 +33,7 @@ class GrowingResolution:
         self._end = end
 
     def resolution(self, iteration: int) -> int:
-        """See `ResolutionSchedule`. Raises ValueError for a negative iteration."""
+        """Raises ValueError for a negative iteration."""
         if iteration < 0:
             raise ValueError(f"iteration: {iteration}: iterations are counted from 0")
         return min(self._end, self._start + self._step * (iteration // self._every))

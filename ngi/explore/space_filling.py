@@ -11,10 +11,10 @@ import torch
 from torch import Tensor
 from torch.quasirandom import SobolEngine
 
-from ngi.explore.proposals import Proposals
+from ngi.explore.proposals import ProposalDistribution, Proposals
 
 
-class Sobol:
+class Sobol(ProposalDistribution):
     """A scrambled Sobol sequence: batch b of n points holds its points n b to n (b + 1) - 1.
 
     Direction numbers of Joe and Kuo (2008), scrambled by random linear maps and a digital shift
@@ -34,7 +34,7 @@ class Sobol:
         self._engine: SobolEngine | None = None  # kept to save time, nothing else
 
     def propose(self, position: Tensor, generator: torch.Generator, *, batch: int) -> Proposals:
-        """See `ProposalDistribution.propose`; nothing is drawn from `generator`.
+        """Nothing is drawn from `generator`.
 
         Raises ValueError for more than 21,201 dimensions.
         """
@@ -56,7 +56,7 @@ class Sobol:
         return _large_steps(self._engine.draw(count, dtype=torch.float64), position)
 
 
-class LatinHypercube:
+class LatinHypercube(ProposalDistribution):
     """n points of which every variable has one in each of n equal intervals (McKay et al. 1979).
 
     Each batch is such a set by itself. One set of all patches of a run would be spread more evenly
@@ -67,7 +67,6 @@ class LatinHypercube:
     starts_chains = True
 
     def propose(self, position: Tensor, generator: torch.Generator, *, batch: int) -> Proposals:
-        """See `ProposalDistribution.propose`."""
         keys, offset = torch.empty(
             (2, *position.shape), dtype=torch.float64, device=position.device
         ).uniform_(generator=generator)

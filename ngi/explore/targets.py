@@ -42,27 +42,25 @@ class Target(Protocol):
         ...
 
 
-class Loss:
+class Loss(Target):
     """The loss alone: the paper's ablation, in which chains stay where nothing can be learned."""
 
     requires = frozenset({"loss"})
 
     def __call__(self, signals: Signals) -> Tensor:
-        """See `Target`."""
         return signals.loss
 
 
-class LossTimesStep:
+class LossTimesStep(Target):
     """Loss times the norm of the optimiser's total step for this sample (paper, Sec. 5.1)."""
 
     requires = frozenset({"loss", "step_norm"})
 
     def __call__(self, signals: Signals) -> Tensor:
-        """See `Target`."""
         return signals.loss * _required(signals.step_norm, "step_norm")
 
 
-class LossTimesOutputGradient:
+class LossTimesOutputGradient(Target):
     """Loss times the norm of its derivative by the network's output.
 
     Not in the paper: it stands in for the step's norm at next to no cost, for it needs no backward
@@ -72,17 +70,15 @@ class LossTimesOutputGradient:
     requires = frozenset({"loss", "output_gradient_norm"})
 
     def __call__(self, signals: Signals) -> Tensor:
-        """See `Target`."""
         return signals.loss * _required(signals.output_gradient_norm, "output_gradient_norm")
 
 
-class Constant:
+class Constant(Target):
     """The same for every sample: for the uniform sampler, which looks at no target."""
 
     requires: frozenset[str] = frozenset()
 
     def __call__(self, signals: Signals) -> Tensor:
-        """See `Target`."""
         return torch.ones_like(signals.loss)
 
 

@@ -32,9 +32,6 @@ class LightningLogger(Remote):
         self._options = options
         self._logger: Any = None
 
-    def finished(self, *, folder: Path, settings: dict[str, Any], label: dict[str, Any]) -> None:
-        pass
-
     def _import(self) -> None:
         if find_spec(self.extra) is None:
             raise RuntimeError(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from ngi.files.durable import write_atomically
 from ngi.files.row_log import RowLog
 from ngi.files.run_folder import TRACKED
 from ngi.learn.aside import Aside
-from ngi.learn.tracker import Row
+from ngi.learn.tracker import Row, Tracker
 
 FINISH_SECONDS = 60.0
 """How long a program may take to send what is left at the end of a run."""
@@ -23,7 +23,7 @@ LEEWAY_SECONDS = 10.0
 """How much longer it may take to say so."""
 
 
-class Remote(ABC):
+class Remote(Tracker):
     """A tracker by another program, which may fail or hang.
 
     Nothing waits for it but the end of the run, and that not for long. Where it fails, a warning

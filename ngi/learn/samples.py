@@ -41,22 +41,28 @@ class Samples(Protocol):
 
     def check_resolution(self, resolution: int) -> None:
         """ValueError where samples cannot be cut from images of so many pixels a side."""
-        ...
+        if resolution < self.patch_size:
+            raise ValueError(
+                f"resolution: the image has {resolution} pixels a side, less than a "
+                f"patch of {self.patch_size}; raise resolution or lower renderer.patch_size"
+            )
 
     def start_patches(self, states: Tensor, *, resolution: int, seed: int) -> PatchJob:
         """See `ngi.render.Renderer.start_patches`: one sample per state [n, dimensions + 2]."""
         ...
 
     def blank(self, count: int) -> Patches:
-        """`count` black samples, for a rehearsal."""
-        ...
+        """`count` black samples, for a rehearsal; patches, where a sample is one."""
+        return Patches.blank(
+            count, layout=self.layout, dimensions=self.dimensions, patch_size=self.patch_size
+        )
 
-    def rearranged(self, patches: Patches, generator: torch.Generator) -> Patches:
+    def rearranged(self, patches: Patches, generator: torch.Generator) -> Patches:  # noqa: ARG002
         """Stored samples, prepared for being trained on again.
 
         A sample of several images may choose anew which of them are the network's input.
         """
-        ...
+        return patches
 
     def example(self, patches: Patches) -> Example:
         """What the network is given of [n] samples, and what it is to answer."""
@@ -70,7 +76,7 @@ class Samples(Protocol):
         ...
 
 
-class PatchSamples:
+class PatchSamples(Samples):
     """The paper's `Samples`: one patch each, from whose buffers and v the network tells radiance.
 
     renderer: of the scene
@@ -116,16 +122,7 @@ class PatchSamples:
             "moving": renderer.moving_points.of(self.components),
         }
 
-    def check_resolution(self, resolution: int) -> None:
-        """See `Samples.check_resolution`."""
-        if resolution < self.patch_size:
-            raise ValueError(
-                f"resolution: the image has {resolution} pixels a side, less than a "
-                f"patch of {self.patch_size}; raise resolution or lower renderer.patch_size"
-            )
-
     def start_patches(self, states: Tensor, *, resolution: int, seed: int) -> PatchJob:
-        """See `Samples.start_patches`."""
         job = self._renderer.start_patches(states, resolution=resolution, seed=seed)
         if self._halves:
             other = derive_seed(seed, b"second half")
@@ -133,23 +130,13 @@ class PatchSamples:
             job = Deferred(mean_of_halves, job, second)
         return job if self._denoise is None else Deferred(self._denoise, job)
 
-    def blank(self, count: int) -> Patches:
-        """See `Samples.blank`."""
-        return Patches.blank(
-            count, layout=self.layout, dimensions=self.dimensions, patch_size=self.patch_size
-        )
-
-    def rearranged(self, patches: Patches, generator: torch.Generator) -> Patches:  # noqa: ARG002
-        """See `Samples.rearranged`: a patch is what it is."""
-        return patches
-
     def example(self, patches: Patches) -> Example:
-        """See `Samples.example`: buffers [n, P, P, C] and v [n, D], or what is seen of it."""
+        """Buffers [n, P, P, C] and v [n, D], or what is seen of it."""
         (buffers, scene_vectors), log_radiance = patch_example(patches)
         return (buffers, self._of(scene_vectors)), log_radiance
 
     def test_inputs(self, scene_vector: Tensor, *, resolution: int) -> tuple[Tensor, ...]:  # noqa: ARG002
-        """See `Samples.test_inputs`: v [D], or what is seen of it."""
+        """Just v [D], or what is seen of it."""
         return (self._of(scene_vector),)
 
     def _of(self, scene_vectors: Tensor) -> Tensor:

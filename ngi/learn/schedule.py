@@ -22,27 +22,22 @@ class Schedule(Protocol):
         """
         ...
 
-    def check(self, budget: Budget) -> None:
+    def check(self, budget: Budget) -> None:  # noqa: ARG002
         """ValueError where the schedule does not fit into the budget."""
-        ...
+        return
 
 
-class ConstantRate:
+class ConstantRate(Schedule):
     """The learning rates as they are (the paper's): any run is the beginning of a longer one."""
 
     def factor(self, *, steps: int, used: float) -> float:  # noqa: ARG002
-        """See `Schedule`."""
         return 1.0
 
     def decays(self, used: float) -> bool:  # noqa: ARG002
-        """See `Schedule`."""
         return False
 
-    def check(self, budget: Budget) -> None:
-        """See `Schedule`."""
 
-
-class WarmupStableDecay:
+class WarmupStableDecay(Schedule):
     """Rises over the first steps, stays, and falls over the last part of the budget.
 
     With k steps taken and the part x of the decay over,
@@ -74,18 +69,16 @@ class WarmupStableDecay:
         self._final = final_factor
 
     def factor(self, *, steps: int, used: float) -> float:
-        """See `Schedule`."""
         warm = min(1.0, (steps + 1) / max(1, self._warmup_steps))
         begin = 1 - self._decay_share
         over = min(1.0, max(0.0, (used - begin) / self._decay_share))
         return warm * (self._final + (1 - self._final) * (1 + math.cos(math.pi * over)) / 2)
 
     def decays(self, used: float) -> bool:
-        """See `Schedule`."""
         return used >= 1 - self._decay_share
 
     def check(self, budget: Budget) -> None:
-        """See `Schedule`. How many steps fit into seconds is not known beforehand."""
+        """How many steps fit into seconds is not known beforehand."""
         if budget.steps is not None and self._warmup_steps >= budget.steps:
             raise ValueError(
                 f"schedule.warmup_steps: {self._warmup_steps} steps of warm-up do not fit into "

@@ -1,5 +1,7 @@
 """Measures the components of `ngi.clock.costs`: in the training loop itself, and by rendering."""
 
+# ruff: noqa: ARG002 - policies and rules are given more than these look at
+
 from __future__ import annotations
 
 import statistics
@@ -12,10 +14,11 @@ import torch
 from torch import Tensor
 
 from ngi.clock.phase_clock import PHASES
+from ngi.explore import Acceptance
 from ngi.learn import Batch, PhaseClock, Samples
 from ngi.learn.lightning_api import Callback, Trainer
 from ngi.machine.timing import repeated, timed
-from ngi.reuse.policies import PolicyState
+from ngi.reuse import PolicyState, ReusePolicy
 
 Seconds = dict[str, list[float]]
 """Phase -> what was measured, in seconds."""
@@ -44,40 +47,26 @@ def rendering_seconds(samples: Samples, *, count: int, seconds: float) -> Second
     return {"render": repeated(MOST_BATCHES, "rendering", timed(render), seconds=seconds)}
 
 
-class InTurn:
-    """A reuse policy: a generated batch, a reused one, and so on."""
+class InTurn(ReusePolicy):
+    """A generated batch, a reused one, and so on; the losses stay unknown."""
 
     by_loss = True  # so that each step is waited for, and its time is its own
 
-    def init(self) -> PolicyState:
-        """See `ReusePolicy`; the losses stay unknown."""
-        return PolicyState()
-
     def probability(
-        self,
-        state: PolicyState,
-        *,
-        generated_batches: int,  # noqa: ARG002
-        store_size: int,  # noqa: ARG002
-        store_capacity: int,  # noqa: ARG002
+        self, state: PolicyState, *, generated_batches: int, store_size: int, store_capacity: int
     ) -> float:
         """1 after a generated batch, else 0."""
         return float(state.generated_batches)
 
     def update(
-        self,
-        state: PolicyState,  # noqa: ARG002
-        *,
-        reused: bool,
-        losses: Tensor,  # noqa: ARG002
-        large_step: Tensor,  # noqa: ARG002
+        self, state: PolicyState, *, reused: bool, losses: Tensor, large_step: Tensor
     ) -> PolicyState:
         """Remembers what the last batch was."""
         return PolicyState(generated_batches=int(not reused))
 
 
-class ScoredInTurn:
-    """An acceptance rule that accepts everything, and has every second generated batch scored.
+class ScoredInTurn(Acceptance):
+    """Accepts everything, and has every second generated batch scored.
 
     scored: whether there are scored batches at all
     """
@@ -88,16 +77,11 @@ class ScoredInTurn:
 
     @property
     def needs_current(self) -> bool:
-        """See `Acceptance`."""
         return self._scored and self._batches % 2 == 1
 
     def __call__(
-        self,
-        target_proposed: Tensor,
-        target_current: Tensor,  # noqa: ARG002
-        generator: torch.Generator,  # noqa: ARG002
+        self, target_proposed: Tensor, target_current: Tensor, generator: torch.Generator
     ) -> Tensor:
-        """See `Acceptance`."""
         self._batches += 1
         return torch.ones_like(target_proposed, dtype=torch.bool)
 

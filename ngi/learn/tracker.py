@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from ngi.evaluate import Evaluation
 
@@ -12,44 +12,24 @@ Row = Mapping[str, object]
 """A row of steps.csv or metrics.csv, with its 'step' and 'run_seconds'."""
 
 
-class Tracker(Protocol):
-    """Watches a run."""
+class Tracker:
+    """Watches a run; what it does not answer to passes it by."""
 
     def start(self, *, folder: Path, settings: dict[str, Any], label: dict[str, Any]) -> None:
         """Called once, before training. RuntimeError where its program is not installed."""
-        ...
 
     def step(self, row: Row) -> None:
         """A row of steps.csv."""
-        ...
 
     def evaluated(self, row: Row, evaluation: Evaluation) -> None:
         """A row of metrics.csv, and what it is the mean of. Run time stands still meanwhile."""
-        ...
 
     def finished(self, *, folder: Path, settings: dict[str, Any], label: dict[str, Any]) -> None:
         """The run was finished before: called instead of all others but `finish`."""
-        ...
 
     def finish(self, *, failed: bool) -> None:
         """Called whatever happens, so that the jobs of a sweep stay apart."""
-        ...
 
 
-class Local:
+class Local(Tracker):
     """The run's own files and nothing else."""
-
-    def start(self, *, folder: Path, settings: dict[str, Any], label: dict[str, Any]) -> None:
-        pass
-
-    def step(self, row: Row) -> None:
-        pass
-
-    def evaluated(self, row: Row, evaluation: Evaluation) -> None:
-        pass
-
-    def finished(self, *, folder: Path, settings: dict[str, Any], label: dict[str, Any]) -> None:
-        pass
-
-    def finish(self, *, failed: bool) -> None:
-        pass

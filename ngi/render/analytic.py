@@ -57,7 +57,6 @@ class AnalyticRenderer(ClosedFormRenderer):
         return spread_points(HARD_FRAMES, self.dimensions)
 
     def shade(self, scene_vectors: Tensor, points: Tensor) -> tuple[Tensor, Tensor]:
-        """See `ClosedFormRenderer.shade`."""
         # In [-1, 1]; the root keeps the frequency in v the same whatever D.
         phase = (scene_vectors[:, None] * self._weights).sum(-1) / sqrt(self.dimensions)
         wave = torch.sin(2 * pi * phase)[:, None, None]

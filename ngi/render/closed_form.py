@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from hashlib import sha256
 from math import sqrt
 
@@ -10,14 +10,14 @@ import torch
 from torch import Tensor
 
 from ngi.patches import BufferLayout, MovingPoints
-from ngi.render.protocol import Deferred, RenderedPatches
+from ngi.render.protocol import RenderedPatches, Renderer
 from ngi.render.render_inputs import check_states, patch_window, require_positive
 from ngi.render.tracing import derive_seed
 
 GOLDEN_RATIO = (1 + sqrt(5)) / 2
 
 
-class ClosedFormRenderer(ABC):
+class ClosedFormRenderer(Renderer):
     """A `ngi.render.Renderer` of the unit square, in pure PyTorch; subclasses give the formula.
 
     Everything is evaluated at pixel centres, so that a patch equals the same pixels of the image.
@@ -65,15 +65,7 @@ class ClosedFormRenderer(ABC):
         points: [n, h, w, 2], x and y in the unit square
         """
 
-    @abstractmethod
-    def hard_frames(self) -> Tensor:
-        """See `ngi.render.Renderer.hard_frames`."""
-
-    def warm_up(self) -> None:  # noqa: B027 - not abstract: right for every formula
-        """Nothing is compiled."""
-
     def render_patches(self, states: Tensor, *, resolution: int, seed: int) -> RenderedPatches:
-        """See `ngi.render.Renderer.render_patches`."""
         check_states(states, self.dimensions)
         P = self.patch_size
         windows = [patch_window(p, patch_size=P, resolution=resolution) for p in states[:, -2:]]
@@ -91,14 +83,9 @@ class ClosedFormRenderer(ABC):
             paths=len(states) * P * P * self.samples_per_pixel,
         )
 
-    def start_patches(self, states: Tensor, *, resolution: int, seed: int) -> Deferred:
-        """See `ngi.render.Renderer.start_patches`."""
-        return Deferred(lambda: self.render_patches(states, resolution=resolution, seed=seed))
-
     def render_image(
         self, scene_vector: Tensor, *, resolution: int, samples_per_pixel: int, seed: int
     ) -> Tensor:
-        """See `ngi.render.Renderer.render_image`."""
         require_positive(samples_per_pixel=samples_per_pixel)
         _, clean = self.whole_image(scene_vector, resolution)
         number = derive_seed(seed, scene_vector.numpy().tobytes(), resolution)
@@ -111,20 +98,15 @@ class ClosedFormRenderer(ABC):
         resolution: int,
         samples: int | None = None,  # noqa: ARG002 - of the pixels' centres
     ) -> Tensor:
-        """See `ngi.render.Renderer.image_buffers`."""
         buffers, _ = self.whole_image(scene_vector, resolution)
         return buffers
 
     def cameras(self, scene_vectors: Tensor) -> Tensor:
-        """See `ngi.render.Renderer.cameras`."""
         return torch.zeros(len(scene_vectors), 6)
 
     def projections(self, scene_vectors: Tensor) -> Tensor:
-        """See `ngi.render.Renderer.projections`: the image is the unit square."""
+        """The image is the unit square."""
         return torch.eye(4).repeat(len(scene_vectors), 1, 1)
-
-    def close(self) -> None:  # noqa: B027
-        """Nothing works elsewhere."""
 
     def whole_image(self, v: Tensor, resolution: int) -> tuple[Tensor, Tensor]:
         """Buffers [H, W, C] and noise-free radiance [H, W, 3] of resolution x resolution pixels."""

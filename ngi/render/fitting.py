@@ -36,7 +36,7 @@ def does_not_fit(error: RuntimeError) -> bool:
     return False
 
 
-class FittingTracer:
+class FittingTracer(Tracer):
     """The `ngi.render.tracing.Tracer` that halves what another one cannot trace at once.
 
     First the samples, then the rows. Each half has a seed of its own, which depends on the whole's
@@ -57,7 +57,6 @@ class FittingTracer:
         self.split = 0
 
     def radiance(self, window: Window, *, samples: int, seed: int) -> Pending:
-        """See `Tracer.radiance`."""
         whole = self._attempt(
             "radiance",
             _pixels(window) * samples,
@@ -79,7 +78,7 @@ class FittingTracer:
         )
 
     def buffers(self, window: Window, *, samples: int) -> Pending:
-        """See `Tracer.buffers`; the same numbers, however it is split."""
+        """The same numbers, however it is split."""
         whole = self._attempt(
             "buffers",
             _pixels(window) * samples,

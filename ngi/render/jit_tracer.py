@@ -21,7 +21,7 @@ from ngi.machine.hand_over import stacked
 from ngi.render.direct_light import light_points
 from ngi.render.first_hit import FirstHit
 from ngi.render.fitting import does_not_fit
-from ngi.render.tracing import Pending, Window, subpixel_points
+from ngi.render.tracing import Pending, Tracer, Window, subpixel_points
 
 Trace = Callable[..., "list[mi.Float]"]
 
@@ -31,7 +31,7 @@ RECORDINGS = 100
 _logger = logging.getLogger(__name__)
 
 
-class JitTracer:
+class JitTracer(Tracer):
     """The `ngi.render.tracing.Tracer` of the JIT variants; results are computed asynchronously.
 
     Of each size of window and number of samples the kernel launches are recorded once and then

@@ -17,7 +17,7 @@ from ngi.render.jit_tracer import JitTracer, free_memory
 from ngi.render.launches import SAMPLES_PER_PASS, bands, passes
 from ngi.render.needs import buffers_are_static
 from ngi.render.projection import Projection
-from ngi.render.protocol import Deferred, RenderedPatches
+from ngi.render.protocol import RenderedPatches, Renderer
 from ngi.render.render_inputs import check_states, patch_window, require_positive
 from ngi.render.scalar_tracer import ScalarTracer
 from ngi.render.tracing import Pending, Tracer, derive_seed
@@ -32,7 +32,7 @@ BUFFER_SAMPLES = {"cuda_ad_rgb": 16, "llvm_ad_rgb": 16, "scalar_rgb": 2}
 """Samples per pixel of the buffers by default; a Python loop takes them in the scalar variant."""
 
 
-class MitsubaRenderer:
+class MitsubaRenderer(Renderer):
     """The `ngi.render.Renderer` of a scene folder (paper, Sec. 4 and 6).
 
     scene: what `ngi.scene.read_scene` gives for a scene folder.
@@ -100,7 +100,7 @@ class MitsubaRenderer:
         self.description = describe(self._variant)
 
     def warm_up(self) -> None:
-        """See `ngi.render.Renderer.warm_up`: of each size one launch, with every material seen."""
+        """Of each size one launch, with every material seen."""
         mi.set_variant(self._variant)
         sizes = sorted(set(self._passes))
         count = max(2, most_materials(self._scene.description.variables))
@@ -110,9 +110,7 @@ class MitsubaRenderer:
                 pending()
 
     def render_patches(self, states: Tensor, *, resolution: int, seed: int) -> RenderedPatches:
-        """See `ngi.render.Renderer.render_patches`.
-
-        All patches are launched before the first is read, so that Python's part of the work
+        """All patches are launched before the first is read, so that Python's part of the work
         runs beside the tracing where the scene's update does not have to wait for it.
         """
         check_states(states, self.dimensions)
@@ -139,14 +137,10 @@ class MitsubaRenderer:
             paths=(len(states) + len(again)) * P * P * self.samples_per_pixel,
         )
 
-    def start_patches(self, states: Tensor, *, resolution: int, seed: int) -> Deferred:
-        """See `ngi.render.Renderer.start_patches`."""
-        return Deferred(lambda: self.render_patches(states, resolution=resolution, seed=seed))
-
     def render_image(
         self, scene_vector: Tensor, *, resolution: int, samples_per_pixel: int, seed: int
     ) -> Tensor:
-        """See `ngi.render.Renderer.render_image`; memory does not grow with the samples.
+        """Memory does not grow with the samples.
 
         Bands of rows are rendered in passes of at most `SAMPLES_PER_PASS`, summed in double
         precision.
@@ -169,7 +163,7 @@ class MitsubaRenderer:
     def image_buffers(
         self, scene_vector: Tensor, *, resolution: int, samples: int | None = None
     ) -> Tensor:
-        """See `ngi.render.Renderer.image_buffers`; the same as a patch's at the same pixels."""
+        """The same as a patch's at the same pixels."""
         samples = self.buffer_samples if samples is None else samples
         require_positive(resolution=resolution, samples=samples)
         mi.set_variant(self._variant)
@@ -177,11 +171,9 @@ class MitsubaRenderer:
         return self._encode(self._whole_buffers(resolution, samples))
 
     def cameras(self, scene_vectors: Tensor) -> Tensor:
-        """See `ngi.render.Renderer.cameras`."""
         return torch.from_numpy(self._scene.description.cameras(scene_vectors.numpy())).float()
 
     def projections(self, scene_vectors: Tensor) -> Tensor:
-        """See `ngi.render.Renderer.projections`."""
         return torch.from_numpy(self._projection.matrices(scene_vectors.numpy())).float()
 
     @cached_property
@@ -194,7 +186,7 @@ class MitsubaRenderer:
         return torch.tensor(self._scene.description.hard_frames, dtype=torch.float32)
 
     def close(self) -> None:
-        """See `ngi.render.Renderer.close`; says how many launches did not fit into memory."""
+        """Says how many launches did not fit into memory."""
         if isinstance(self._tracer, FittingTracer) and (split := self._tracer.split):
             _logger.warning("%d launches did not fit into memory and were traced in parts", split)
 

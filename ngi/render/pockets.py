@@ -124,7 +124,6 @@ class PocketRenderer(ClosedFormRenderer):
         return self._weights(self._offsets(scene_vectors))
 
     def shade(self, scene_vectors: Tensor, points: Tensor) -> tuple[Tensor, Tensor]:
-        """See `ClosedFormRenderer.shade`."""
         phase = (scene_vectors[:, None] * self._albedo_weights).sum(-1) / sqrt(self.dimensions)
         albedo = (0.5 + 0.4 * torch.sin(2 * pi * phase))[:, None, None]
         radiance = albedo * (AMBIENT + SPOT * _gaussian(points - 0.5, SPOT_RADIUS))

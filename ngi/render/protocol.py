@@ -90,7 +90,7 @@ class Renderer(Protocol):
 
     def warm_up(self) -> None:
         """Compiles what patches need, so that no run pays for it and the next one does not."""
-        ...
+        return
 
     def render_patches(self, states: Tensor, *, resolution: int, seed: int) -> RenderedPatches:
         """Traces one patch per state; only its own pixels.
@@ -104,8 +104,11 @@ class Renderer(Protocol):
         ...
 
     def start_patches(self, states: Tensor, *, resolution: int, seed: int) -> PatchJob:
-        """`render_patches` that may go on beside whatever the caller does next."""
-        ...
+        """`render_patches` that may go on beside whatever the caller does next.
+
+        By itself it begins when the patches are asked for.
+        """
+        return Deferred(lambda: self.render_patches(states, resolution=resolution, seed=seed))
 
     def render_image(
         self, scene_vector: Tensor, *, resolution: int, samples_per_pixel: int, seed: int
@@ -151,4 +154,4 @@ class Renderer(Protocol):
 
     def close(self) -> None:
         """Ends whatever works for the renderer elsewhere; it is not used any more."""
-        ...
+        return

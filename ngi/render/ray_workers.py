@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import ray
 from ray.exceptions import RayError
 
-from ngi.render.worker_protocol import RenderServer, Reply, Request, WorkerDiedError
+from ngi.render.worker_protocol import RenderServer, Reply, Request, Worker, WorkerDiedError
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class Share:
     gpus: float
 
 
-class RayWorker:
+class RayWorker(Worker):
     """The `Worker` that is an actor, which Ray places on a machine with room for its share.
 
     number: 0, 1, ... make: pickled function without arguments that makes the renderer, there.
@@ -35,11 +35,9 @@ class RayWorker:
         self.name = f"renderer actor {number}"
 
     def send(self, request: Request) -> None:
-        """See `Worker.send`."""
         self._replies.append(self._actor.render.remote(request))
 
     def receive(self) -> Reply:
-        """See `Worker.receive`."""
         try:
             reply: Reply = ray.get(self._replies.popleft())
         except RayError as error:
@@ -47,11 +45,7 @@ class RayWorker:
         return reply
 
     def kill(self) -> None:
-        """See `Worker.kill`."""
         ray.kill(self._actor)
-
-    def release(self) -> None:
-        """Nothing is held here."""
 
 
 def join_cluster(address: str, *, workers: int) -> Share:

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from ngi.machine.backend import mi
 from ngi.render.direct_light import light_points
 from ngi.render.first_hit import FirstHit
-from ngi.render.tracing import Pending, Window, subpixel_points
+from ngi.render.tracing import Pending, Tracer, Window, subpixel_points
 
 
-class ScalarTracer:
+class ScalarTracer(Tracer):
     """The `ngi.render.tracing.Tracer` of scalar_rgb.
 
     Radiance comes from Mitsuba's own compiled rendering loop, over the crop window of a copy of the

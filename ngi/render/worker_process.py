@@ -20,14 +20,14 @@ from threading import Thread
 import torch
 
 from ngi.machine.memory import keep_freed_memory
-from ngi.render.worker_protocol import RenderServer, Reply, Request, WorkerDiedError
+from ngi.render.worker_protocol import RenderServer, Reply, Request, Worker, WorkerDiedError
 
 NICENESS = 10
 """Of processes that render on the CPU: a tenth of its time while training wants all of it. At 0 a
 6x128 step beside two of them took three times as long on two cores; at 19 nothing was rendered."""
 
 
-class WorkerProcess:
+class WorkerProcess(Worker):
     """The `Worker` that is a process of this machine, in which `serve` runs.
 
     number, of: 0, 1, ... of how many; together they use the machine's cores once.
@@ -58,11 +58,9 @@ class WorkerProcess:
         self._send(make)
 
     def send(self, request: Request) -> None:
-        """See `Worker.send`."""
         self._send(pickle.dumps(request))
 
     def receive(self) -> Reply:
-        """See `Worker.receive`."""
         try:
             reply: Reply = pickle.loads(self._connection.recv_bytes())
         except (EOFError, OSError):
@@ -72,11 +70,9 @@ class WorkerProcess:
         return reply
 
     def kill(self) -> None:
-        """See `Worker.kill`."""
         self._process.kill()
 
     def release(self) -> None:
-        """See `Worker.release`."""
         self._process.wait()
         self._connection.close()
 

@@ -55,8 +55,8 @@ class Worker(Protocol):
         ...
 
     def release(self) -> None:
-        """Waits until it is gone, after `kill`, and gives back what this end holds."""
-        ...
+        """Waits until it is gone, after `kill`, and gives back what this end holds, if anything."""
+        return
 
 
 class RenderServer:

@@ -39,7 +39,7 @@ def mitsuba_renderer(*, workers: int, cluster: str | None, **options: Any) -> Re
     )
 
 
-class WorkerRenderer:
+class WorkerRenderer(Renderer):
     """The `ngi.render.Renderer` whose patches are rendered elsewhere; images are rendered here.
 
     make: makes the renderer, here and in every worker; can be pickled, and not of `__main__`.
@@ -81,15 +81,14 @@ class WorkerRenderer:
         self._close = weakref.finalize(self, self._pool.close)
 
     def warm_up(self) -> None:
-        """See `ngi.render.Renderer.warm_up`; all workers at the same time."""
+        """All workers at the same time."""
         self._pool.warm_up()
 
     def render_patches(self, states: Tensor, *, resolution: int, seed: int) -> RenderedPatches:
-        """See `ngi.render.Renderer.render_patches`."""
         return self.start_patches(states, resolution=resolution, seed=seed).result()
 
     def start_patches(self, states: Tensor, *, resolution: int, seed: int) -> Deferred:
-        """See `ngi.render.Renderer.start_patches`; what is wrong with states is raised here."""
+        """What is wrong with states is raised here."""
         check_states(states, self.dimensions)
         for state in states:
             patch_window(state[-2:], patch_size=self.patch_size, resolution=resolution)
@@ -101,7 +100,6 @@ class WorkerRenderer:
     def render_image(
         self, scene_vector: Tensor, *, resolution: int, samples_per_pixel: int, seed: int
     ) -> Tensor:
-        """See `ngi.render.Renderer.render_image`."""
         return self._local.render_image(
             scene_vector, resolution=resolution, samples_per_pixel=samples_per_pixel, seed=seed
         )
@@ -109,23 +107,19 @@ class WorkerRenderer:
     def image_buffers(
         self, scene_vector: Tensor, *, resolution: int, samples: int | None = None
     ) -> Tensor:
-        """See `ngi.render.Renderer.image_buffers`."""
         return self._local.image_buffers(scene_vector, resolution=resolution, samples=samples)
 
     def cameras(self, scene_vectors: Tensor) -> Tensor:
-        """See `ngi.render.Renderer.cameras`."""
         return self._local.cameras(scene_vectors)
 
     def projections(self, scene_vectors: Tensor) -> Tensor:
-        """See `ngi.render.Renderer.projections`."""
         return self._local.projections(scene_vectors)
 
     def hard_frames(self) -> Tensor:
-        """See `ngi.render.Renderer.hard_frames`."""
         return self._local.hard_frames()
 
     def close(self) -> None:
-        """See `ngi.render.Renderer.close`; a `with` block does it too."""
+        """A `with` block does it too."""
         self._close()
 
     def __enter__(self) -> Self:

@@ -32,10 +32,10 @@ class DrawingRule(Protocol):
 
     def weights(self, losses: Tensor, slots: Tensor) -> Tensor | None:
         """[n] float64, the factors of n drawn patches' losses in the batch's mean; None for 1."""
-        ...
+        return None
 
 
-class ProportionalToLoss:
+class ProportionalToLoss(DrawingRule):
     """With replacement, in proportion to the last recorded loss (paper, Sec. 6.1).
 
     With all losses 0 every patch is as likely.
@@ -46,15 +46,10 @@ class ProportionalToLoss:
     def draw(
         self, losses: Tensor, waiting: Tensor, count: int, generator: torch.Generator
     ) -> tuple[Tensor, Tensor]:
-        """See `DrawingRule`."""
         return _draw_in_proportion(losses, count, generator), waiting
 
-    def weights(self, losses: Tensor, slots: Tensor) -> Tensor | None:
-        """See `DrawingRule`: 1."""
-        return None
 
-
-class Epochs:
+class Epochs(DrawingRule):
     """Without replacement: each patch once per epoch, in an order that is drawn for every epoch.
 
     A batch that reaches beyond the end of an epoch is filled up from the next one. Patches that
@@ -66,18 +61,14 @@ class Epochs:
     def draw(
         self, losses: Tensor, waiting: Tensor, count: int, generator: torch.Generator
     ) -> tuple[Tensor, Tensor]:
-        """See `DrawingRule`; `waiting` is the rest of the epoch."""
+        """`waiting` is the rest of the epoch."""
         while len(waiting) < count:
             waiting = torch.cat([waiting, torch.randperm(len(losses), generator=generator)])
         return waiting[:count], waiting[count:].clone()
 
-    def weights(self, losses: Tensor, slots: Tensor) -> Tensor | None:
-        """See `DrawingRule`: 1."""
-        return None
-
 
 @dataclass(frozen=True, kw_only=True)
-class Prioritised:
+class Prioritised(DrawingRule):
     """Prioritized experience replay, proportional (Schaul et al. 2016, Sec. 3.3 and 3.4).
 
     Patch i is drawn with probability P(i) = p_i^alpha / sum_j p_j^alpha, p_i = loss_i + epsilon,
@@ -106,11 +97,9 @@ class Prioritised:
     def draw(
         self, losses: Tensor, waiting: Tensor, count: int, generator: torch.Generator
     ) -> tuple[Tensor, Tensor]:
-        """See `DrawingRule`."""
         return _draw_in_proportion(self._priorities(losses), count, generator), waiting
 
     def weights(self, losses: Tensor, slots: Tensor) -> Tensor | None:
-        """See `DrawingRule`."""
         # 1 / m and the sum of all priorities are the same for all patches of the batch.
         priorities = self._priorities(losses[slots])
         return (priorities.min() / priorities) ** self.beta

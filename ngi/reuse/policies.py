@@ -37,14 +37,11 @@ class PolicyState:
 class ReusePolicy(Protocol):
     """Gives the probability with which the next batch is a reused one."""
 
-    @property
-    def by_loss(self) -> bool:
-        """Whether it depends on the losses."""
-        ...
+    by_loss: bool = False  # whether it depends on the losses
 
     def init(self) -> PolicyState:
         """The state at the start of a run."""
-        ...
+        return PolicyState()
 
     def probability(
         self, state: PolicyState, *, generated_batches: int, store_size: int, store_capacity: int
@@ -59,41 +56,24 @@ class ReusePolicy(Protocol):
     def update(
         self, state: PolicyState, *, reused: bool, losses: Tensor, large_step: Tensor
     ) -> PolicyState:
-        """The state after a batch was trained on.
+        """The state after a batch was trained on: a policy without averages only counts.
 
         reused: whether the batch was reused or generated
         losses: [n], before the optimiser's step; large_step: [n] bool, as stored with the patches
         """
-        ...
-
-
-class _Stateless:
-    """What the policies without averages share: they count, and look at no loss."""
-
-    by_loss = False
-
-    def init(self) -> PolicyState:
-        """See `ReusePolicy`."""
-        return PolicyState()
-
-    def update(
-        self, state: PolicyState, *, reused: bool, losses: Tensor, large_step: Tensor
-    ) -> PolicyState:
-        """See `ReusePolicy`."""
         return replace(state, generated_batches=state.generated_batches + (not reused))
 
 
-class Never(_Stateless):
+class Never(ReusePolicy):
     """Generates every batch: the paper's test of the samples' distribution (Sec. 5.1)."""
 
     def probability(
         self, state: PolicyState, *, generated_batches: int, store_size: int, store_capacity: int
     ) -> float:
-        """See `ReusePolicy`."""
         return 0.0
 
 
-class UntilFull(_Stateless):
+class UntilFull(ReusePolicy):
     """Generates until the store is full and reuses from then on: a fixed data set.
 
     Patches are trained on as they are generated, which is the first epoch. Were the data set made
@@ -104,11 +84,10 @@ class UntilFull(_Stateless):
     def probability(
         self, state: PolicyState, *, generated_batches: int, store_size: int, store_capacity: int
     ) -> float:
-        """See `ReusePolicy`."""
         return 1.0 if store_size >= store_capacity else 0.0
 
 
-class FixedProbability(_Stateless):
+class FixedProbability(ReusePolicy):
     """Reuses with one probability, once `bootstrap_batches` batches were generated."""
 
     def __init__(self, *, bootstrap_batches: int, probability: float) -> None:
@@ -121,13 +100,12 @@ class FixedProbability(_Stateless):
     def probability(
         self, state: PolicyState, *, generated_batches: int, store_size: int, store_capacity: int
     ) -> float:
-        """See `ReusePolicy`."""
         if store_size == 0 or generated_batches < self._bootstrap_batches:
             return 0.0
         return self._probability
 
 
-class SelfTuning:
+class SelfTuning(ReusePolicy):
     """Reuses with probability p_s = sigmoid(L_exist - L_new + beta) (paper, Sec. 6.1, Eq. 5).
 
     When the network does better on what it has seen than on what is new, p_s falls.
@@ -155,14 +133,9 @@ class SelfTuning:
         self._beta = beta
         self._ema_coefficient = ema_coefficient
 
-    def init(self) -> PolicyState:
-        """See `ReusePolicy`."""
-        return PolicyState()
-
     def probability(
         self, state: PolicyState, *, generated_batches: int, store_size: int, store_capacity: int
     ) -> float:
-        """See `ReusePolicy`."""
         if store_size == 0 or generated_batches < self._bootstrap_batches:
             return 0.0
         if state.existing_loss is None or state.new_loss is None:
@@ -172,7 +145,7 @@ class SelfTuning:
     def update(
         self, state: PolicyState, *, reused: bool, losses: Tensor, large_step: Tensor
     ) -> PolicyState:
-        """See `ReusePolicy`. Raises ValueError where losses and large_step differ in shape."""
+        """Raises ValueError where losses and large_step differ in shape."""
         if losses.shape != large_step.shape:
             raise ValueError(
                 f"large_step: shape {list(large_step.shape)}: give one per loss, "

@@ -8,7 +8,7 @@ from functools import partial
 import torch
 from torch import Tensor
 
-from ngi.learn.samples import Example
+from ngi.learn.samples import Example, Samples
 from ngi.patches import Patches
 from ngi.render.protocol import Deferred, PatchJob, RenderedPatches, Renderer
 from ngi.render.render_inputs import check_states, patch_window
@@ -18,8 +18,8 @@ TEST_SEED = 0
 """Of the noise of test frames, and of the way that leads to them."""
 
 
-class Sequences:
-    """`Samples` of Işık et al. 2021: patches of a few frames, in which v moves along a line.
+class Sequences(Samples):
+    """The samples of Işık et al. 2021: patches of a few frames, in which v moves along a line.
 
     Every frame is rendered with the renderer's samples per pixel, and `target_renderings` times
     more with other random numbers, whose mean is what the denoiser is to give. A state is v of the
@@ -51,19 +51,10 @@ class Sequences:
         self.network_arguments = {"layout": self.layout, "scene_dimensions": self.dimensions}
         self.patch_size = renderer.patch_size
 
-    def check_resolution(self, resolution: int) -> None:
-        """See `Samples.check_resolution`."""
-        if resolution < self.patch_size:
-            raise ValueError(
-                f"resolution: the image has {resolution} pixels a side, less than a "
-                f"patch of {self.patch_size}; raise resolution or lower renderer.patch_size"
-            )
-
     def start_patches(self, states: Tensor, *, resolution: int, seed: int) -> PatchJob:
-        """See `Samples.start_patches`.
+        """Of n sequences, buffers [n, frames, P, P, C] and radiance [n, 2, frames, P, P, 3].
 
-        Of n sequences, buffers [n, frames, P, P, C] and radiance [n, 2, frames, P, P, 3], as it is
-        given and as it is to become.
+        The radiance is first as it is given, then as it is to become.
         """
         check_states(states, self.dimensions)
         position = states[:, None, -2:].expand(-1, self._frames, -1)
@@ -77,10 +68,7 @@ class Sequences:
         return Deferred(partial(_sequences, frames=self._frames), *jobs)
 
     def blank(self, count: int) -> Patches:
-        """See `Samples.blank`."""
-        patches = Patches.blank(
-            count, layout=self.layout, dimensions=self.dimensions, patch_size=self.patch_size
-        )
+        patches = super().blank(count)
         axes = (1, self._frames, 1, 1, 1)
         return replace(
             patches,
@@ -88,12 +76,8 @@ class Sequences:
             log_radiance=patches.log_radiance[:, None, None].repeat(1, 2, *axes[1:]),
         )
 
-    def rearranged(self, patches: Patches, generator: torch.Generator) -> Patches:  # noqa: ARG002
-        """See `Samples.rearranged`: a sequence is what it is."""
-        return patches
-
     def example(self, patches: Patches) -> Example:
-        """See `Samples.example`: the arguments of `ngi.methods.anf.AffinityDenoiser.forward`."""
+        """The arguments of `ngi.methods.anf.AffinityDenoiser.forward`."""
         corners = [
             patch_window(position, patch_size=self.patch_size, resolution=int(resolution))
             for position, resolution in zip(patches.position, patches.resolution, strict=True)
@@ -108,7 +92,7 @@ class Sequences:
         return (patches.buffers, noisy, sources), target
 
     def test_inputs(self, scene_vector: Tensor, *, resolution: int) -> tuple[Tensor, ...]:
-        """See `Samples.test_inputs`: the arguments of `ngi.methods.anf.AffinityDenoiser.render`."""
+        """The arguments of `ngi.methods.anf.AffinityDenoiser.render`."""
         generator = torch.Generator().manual_seed(TEST_SEED)
         back = torch.rand(len(scene_vector), generator=generator)
         path = self.path(torch.cat([scene_vector, back])[None]).flip(1)[0]

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 from torch.quasirandom import SobolEngine
 
-from ngi.learn.samples import Example
+from ngi.learn.samples import Example, Samples
 from ngi.patches import Patches
 from ngi.render.protocol import Deferred, PatchJob, RenderedPatches, Renderer
 from ngi.render.render_inputs import check_states
@@ -17,8 +17,8 @@ TEST_SEED = 0
 """Of the observations of test frames: noise, and where they are taken from."""
 
 
-class ObservationSets:
-    """`Samples` of Granskog et al. 2020: a query image, and observations of the same scene.
+class ObservationSets(Samples):
+    """The samples of Granskog et al. 2020: a query image, and observations of the same scene.
 
     All of them are whole images of P x P pixels, with as many samples per pixel; the paper has 3
     observations, P = 64 and 16 sets in a batch (Sec. 7.2.2). A state is v, whose camera is the
@@ -43,7 +43,6 @@ class ObservationSets:
         self.patch_size = renderer.patch_size
 
     def check_resolution(self, resolution: int) -> None:
-        """See `Samples.check_resolution`."""
         if resolution != self.patch_size:
             raise ValueError(
                 f"resolution: images of {resolution} pixels a side, but data=observation_sets "
@@ -52,7 +51,7 @@ class ObservationSets:
             )
 
     def start_patches(self, states: Tensor, *, resolution: int, seed: int) -> PatchJob:
-        """See `Samples.start_patches`: n sets as [n, 1 + observations, P, P, ...], query first."""
+        """Of n sets, [n, 1 + observations, P, P, ...], query first."""
         check_states(states, self.dimensions)
         views = self._views(states[:, :-2])
         job = self._renderer.start_patches(
@@ -69,10 +68,7 @@ class ObservationSets:
         return Deferred(sets, job)
 
     def blank(self, count: int) -> Patches:
-        """See `Samples.blank`."""
-        patches = Patches.blank(
-            count, layout=self.layout, dimensions=self.dimensions, patch_size=self.patch_size
-        )
+        patches = super().blank(count)
         images = 1 + self._shape[0]
         return replace(
             patches,
@@ -81,7 +77,7 @@ class ObservationSets:
         )
 
     def rearranged(self, patches: Patches, generator: torch.Generator) -> Patches:
-        """See `Samples.rearranged`: the images of all sets in one random order."""
+        """The images of all sets in one random order."""
         order = torch.randperm(1 + self._shape[0], generator=generator)
         views = self._views(patches.scene_vector)[:, order]
         return replace(
@@ -92,7 +88,7 @@ class ObservationSets:
         )
 
     def example(self, patches: Patches) -> Example:
-        """See `Samples.example`: the arguments of `ngi.methods.cnsr.CNSR.forward`."""
+        """The arguments of `ngi.methods.cnsr.CNSR.forward`."""
         views = self._views(patches.scene_vector).cpu()
         cameras = self._renderer.cameras(views.flatten(0, 1)).unflatten(0, views.shape[:2])
         cameras = cameras.to(patches.buffers)
@@ -101,7 +97,7 @@ class ObservationSets:
         return (*query, images[:, 1:], cameras[:, 1:]), patches.log_radiance[:, 0]
 
     def test_inputs(self, scene_vector: Tensor, *, resolution: int) -> tuple[Tensor, ...]:  # noqa: ARG002
-        """See `Samples.test_inputs`: the observations keep the resolution of training."""
+        """The observations keep the resolution of training."""
         observations, components = self._shape
         engine = SobolEngine(max(components, 1), scramble=True, seed=TEST_SEED)
         taken_from = engine.draw(observations)[:, :components].flatten()
