@@ -2,11 +2,8 @@
 
 from ngi.clock.budget import Budget
 from ngi.clock.costs import Component, CostFile, Costs, components
-from ngi.clock.counters import Counters
 from ngi.clock.model_clock import ModelClock
-from ngi.clock.phase_clock import PhaseClock, RunClock
-from ngi.files.record_log import RecordLog
-from ngi.files.row_log import RowLog
+from ngi.clock.phase_clock import PhaseClock
 from ngi.files.run_folder import RunFolder
 from ngi.learn.batch import Batch, Feedback
 from ngi.learn.callbacks import StepLog, callbacks
@@ -18,7 +15,6 @@ from ngi.learn.checkpoint import (
 )
 from ngi.learn.datamodule import ExplorationDataModule
 from ngi.learn.interruption import Interrupted, Interruption
-from ngi.learn.learning_rate import LearningRate
 from ngi.learn.lightning_trackers import MLflow, TensorBoard
 from ngi.learn.module import IlluminationModule, seeded
 from ngi.learn.outcome import Outcome, Step
@@ -43,7 +39,6 @@ __all__ = [
     "ConstantRate",
     "CostFile",
     "Costs",
-    "Counters",
     "Example",
     "ExplorationDataModule",
     "Feedback",
@@ -51,18 +46,14 @@ __all__ = [
     "Interrupted",
     "Interruption",
     "Learner",
-    "LearningRate",
     "Local",
     "MLflow",
     "ModelClock",
     "Outcome",
     "PatchSamples",
     "PhaseClock",
-    "RecordLog",
     "Recorder",
-    "RowLog",
     "Run",
-    "RunClock",
     "RunFolder",
     "Samples",
     "Schedule",

@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ngi.learn import RecordLog
+from ngi.files.record_log import RecordLog
 
 
 def record(step: int) -> dict[str, object]:

@@ -16,7 +16,8 @@ from typing import Any
 import pytest
 
 from ngi.files.growing_file import GrowingFile
-from ngi.learn import RecordLog, RowLog
+from ngi.files.record_log import RecordLog
+from ngi.files.row_log import RowLog
 from tests.learn.comparison import assert_same_run
 from tests.learn.forked import configuration, run
 

@@ -8,10 +8,10 @@ import pytest
 import torch
 from torch.func import grad
 
+from ngi.clock.counters import Counters
 from ngi.explore import Loss, LossTimesOutputGradient, LossTimesStep, Target
 from ngi.learn import (
     Batch,
-    Counters,
     Feedback,
     IlluminationModule,
     PhaseClock,

@@ -12,6 +12,7 @@ from omegaconf import DictConfig
 from torch import Tensor
 
 from ngi import learn
+from ngi.clock.counters import Counters
 from ngi.config.build import build_module
 from ngi.explore import ConstantTarget
 from ngi.learn import Batch
@@ -102,7 +103,7 @@ class _Answered:
     def __init__(self) -> None:
         self.sampler = SimpleNamespace(target=ConstantTarget())
         self.clock = learn.PhaseClock()
-        self.counters = learn.Counters()
+        self.counters = Counters()
 
     def feedback(self, _: learn.Feedback) -> None:
         self.counters.iteration += 1

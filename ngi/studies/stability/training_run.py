@@ -17,6 +17,7 @@ from omegaconf import DictConfig
 from torch import Tensor
 
 from ngi import learn
+from ngi.clock.counters import Counters
 from ngi.config.build import build_module, build_samples, build_stream
 from ngi.config.configuration import composed
 from ngi.learn.lightning_api import Callback, Trainer
@@ -78,7 +79,7 @@ class Trained:
     losses: list[float] = field(default_factory=list)
     gradient_norms: list[float] = field(default_factory=list)
     weights_finite: bool = False
-    counters: learn.Counters = field(default_factory=learn.Counters)
+    counters: Counters = field(default_factory=Counters)
     longest_stay: int = 0
     stopped: str | None = None
     report: bool = False
