@@ -14,7 +14,7 @@ from torch import Tensor
 
 from ngi.evaluate.frames import Frame
 from ngi.evaluate.linear import write_linear
-from ngi.evaluate.pictures import Panels, stacked, write_pictures
+from ngi.evaluate.pictures import Panels, stacked
 from ngi.evaluate.protocol import METRICS, SETS, EvaluationProtocol
 from ngi.evaluate.reference import Reference
 from ngi.files.durable import full_disk_named
@@ -67,30 +67,45 @@ class Comparison:
     error_maps: dict[str, Image.Image]
 
 
+@dataclass(frozen=True, kw_only=True)
+class EvaluatedFrame:
+    """A test frame, what was predicted of it, and how good that is.
+
+    prediction: [H, W, 3] linear radiance
+    floor: what a perfect prediction would score for the reference's own noise; of DSSIM and LPIPS a
+        lower bound, see `Reference.radiance`
+    seconds: by part: 'buffers', 'inputs' (whatever else the network is given of a frame, which may
+        have to be path-traced) and 'network'
+    """
+
+    frame: Frame
+    prediction: Tensor
+    reference: Reference
+    metrics: FrameMetrics
+    floor: FrameMetrics
+    seconds: dict[str, float]
+
+    def panels(self, protocol: EvaluationProtocol) -> Panels:
+        """Its pictures."""
+        return Panels.of(
+            self.prediction,
+            self.reference.radiance,
+            epsilon=protocol.epsilon,
+            exposure=protocol.exposure,
+        )
+
+
 @dataclass(frozen=True)
 class Evaluation:
     """The metrics of every test frame under one protocol.
 
-    frames: the test frames
-    metrics: their metrics, in the same order
-    floors: what a perfect prediction would score for the references' own noise, in the same order;
-        of DSSIM and LPIPS a lower bound, see `Reference.radiance`
-    predictions: [H, W, 3] linear radiance, in the same order
-    references: the reference images, in the same order
     reference_hash: hash over all references
-    seconds: of each frame, in the same order, by part: 'buffers', 'inputs' (whatever else the
-        network is given of a frame, which may have to be path-traced) and 'network'
     lpips_note: why there is no LPIPS, or None
     """
 
     protocol: EvaluationProtocol
-    frames: tuple[Frame, ...]
-    metrics: tuple[FrameMetrics, ...]
-    floors: tuple[FrameMetrics, ...]
-    predictions: tuple[Tensor, ...]
-    references: tuple[Reference, ...]
+    frames: tuple[EvaluatedFrame, ...]
     reference_hash: str
-    seconds: tuple[dict[str, float], ...]
     lpips_note: str | None
 
     def row(self) -> dict[str, float | int | None]:
@@ -100,13 +115,12 @@ class Evaluation:
         """
         row: dict[str, float | int | None] = {}
         for set_name in SETS:
+            metrics = [frame.metrics for frame in self._of(set_name)]
             for metric in METRICS:
-                values = _values(self.metrics, set_name, metric)
+                values = _values(metrics, metric)
                 row[f"{set_name}_{metric}"] = None if values is None else mean(values)
                 row[f"{set_name}_{metric}_worst5"] = None if values is None else worst_mean(values)
-            row[f"{set_name}_non_finite"] = sum(
-                frame.non_finite for frame in self.metrics if frame.set == set_name
-            )
+            row[f"{set_name}_non_finite"] = sum(frame.non_finite for frame in metrics)
         return row
 
     def result(self) -> dict[str, Any]:
@@ -126,22 +140,26 @@ class Evaluation:
             "non_finite": {set_name: self.row()[f"{set_name}_non_finite"] for set_name in SETS},
             "frames": [
                 {
-                    **asdict(frame),
-                    "reference_noise": reference.noise,
-                    "reference_samples_per_pixel": reference.samples_per_pixel,
+                    **asdict(frame.metrics),
+                    "reference_noise": frame.reference.noise,
+                    "reference_samples_per_pixel": frame.reference.samples_per_pixel,
                 }
-                for frame, reference in zip(self.metrics, self.references, strict=True)
+                for frame in self.frames
             ],
             "frame_seconds": {
-                part: median(of_frame[part] for of_frame in self.seconds)
-                for part in self.seconds[0]
+                part: median(frame.seconds[part] for frame in self.frames)
+                for part in self.frames[0].seconds
             },
             "lpips_note": self.lpips_note,
         }
 
+    def _of(self, set_name: str) -> list[EvaluatedFrame]:
+        return [frame for frame in self.frames if frame.frame.set == set_name]
+
     def _summary(self, set_name: str, metric: str) -> dict[str, float] | None:
-        values = _values(self.metrics, set_name, metric)
-        floors = _values(self.floors, set_name, metric)
+        frames = self._of(set_name)
+        values = _values([frame.metrics for frame in frames], metric)
+        floors = _values([frame.floor for frame in frames], metric)
         if values is None or floors is None:
             return None
         return {"mean": mean(values), "worst5": worst_mean(values), "floor": mean(floors)}
@@ -155,48 +173,32 @@ class Evaluation:
         with full_disk_named(folder / "pictures"):
             self.write_pictures(folder / "pictures")
         linear = {
-            (frame.set, frame.index): (prediction, reference.radiance)
-            for frame, prediction, reference in zip(
-                self.frames, self.predictions, self.references, strict=True
-            )
+            (each.frame.set, each.frame.index): (each.prediction, each.reference.radiance)
+            for each in self.frames
         }
         return write_linear(folder / "linear", linear, megabytes=linear_megabytes)
 
     def comparison(self, set_name: str) -> Comparison:
         """The frames of a set, as they are shown elsewhere than in the run's folder."""
         rows, error_maps = [], {}
-        for frame, metrics, prediction, reference in zip(
-            self.frames, self.metrics, self.predictions, self.references, strict=True
-        ):
-            if frame.set != set_name:
-                continue
-            name = f"{frame.set} {frame.index}"
-            shown = Panels.of(
-                prediction,
-                reference.radiance,
-                epsilon=self.protocol.epsilon,
-                exposure=self.protocol.exposure,
-            )
+        for frame in self._of(set_name):
+            name = f"{set_name} {frame.frame.index}"
+            shown = frame.panels(self.protocol)
             error_maps[name] = shown.error
-            rows.append(shown.triptych(mape=metrics.mape, name=name))
+            rows.append(shown.triptych(mape=frame.metrics.mape, name=name))
         return Comparison(stacked(rows), error_maps)
 
     def write_pictures(self, folder: Path) -> None:
         """Writes every frame's prediction, reference, error map and labelled triptych as PNG."""
-        for frame, metrics, prediction, reference in zip(
-            self.frames, self.metrics, self.predictions, self.references, strict=True
-        ):
-            write_pictures(
+        for each in self.frames:
+            each.panels(self.protocol).write(
                 folder,
-                f"{frame.set}_{frame.index:02d}",
-                prediction=prediction,
-                reference=reference.radiance,
+                f"{each.frame.set}_{each.frame.index:02d}",
                 epsilon=self.protocol.epsilon,
-                exposure=self.protocol.exposure,
-                mape=metrics.mape,
+                mape=each.metrics.mape,
             )
 
 
-def _values(frames: Iterable[FrameMetrics], set_name: str, metric: str) -> list[float] | None:
-    values = [getattr(frame, metric) for frame in frames if frame.set == set_name]
+def _values(frames: Iterable[FrameMetrics], metric: str) -> list[float] | None:
+    values = [getattr(frame, metric) for frame in frames]
     return None if None in values else values

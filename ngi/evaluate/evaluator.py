@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 from tqdm import tqdm
 
-from ngi.evaluate.evaluation import Evaluation, FrameMetrics
+from ngi.evaluate.evaluation import EvaluatedFrame, Evaluation, FrameMetrics
 from ngi.evaluate.frames import Frame, evaluation_frames
 from ngi.evaluate.image_metrics import image_metrics
 from ngi.evaluate.lpips_metric import Lpips
@@ -127,24 +127,23 @@ class Evaluator:
         Raises ValueError where its answer is not [H, W, 3].
         """
         self.prepare()
-        seconds = tuple(dict(prepared.seconds) for prepared in self._prepared)
-        predictions = tuple(
-            timed(of_frame, "network", _radiance, predict, prepared)
-            for of_frame, prepared in zip(seconds, self._prepared, strict=True)
-        )
         return Evaluation(
             protocol=self.protocol,
-            frames=self._frames,
-            metrics=tuple(
-                self._measure(prepared.frame, prediction, prepared.reference.radiance)
-                for prepared, prediction in zip(self._prepared, predictions, strict=True)
-            ),
-            floors=tuple(prepared.floor for prepared in self._prepared),
-            predictions=predictions,
-            references=tuple(prepared.reference for prepared in self._prepared),
+            frames=tuple(self._evaluated(prepared, predict) for prepared in self._prepared),
             reference_hash=self._reference_hash,
-            seconds=seconds,
             lpips_note=self._lpips.reason,
+        )
+
+    def _evaluated(self, prepared: _PreparedFrame, predict: Predict) -> EvaluatedFrame:
+        seconds = dict(prepared.seconds)
+        prediction = timed(seconds, "network", _radiance, predict, prepared)
+        return EvaluatedFrame(
+            frame=prepared.frame,
+            prediction=prediction,
+            reference=prepared.reference,
+            metrics=self._measure(prepared.frame, prediction, prepared.reference.radiance),
+            floor=prepared.floor,
+            seconds=seconds,
         )
 
     def _buffers(self, v: Tensor) -> Tensor:

@@ -32,33 +32,6 @@ _TOP = 2 * _MARGIN + 14
 _BAR_WIDTH = 14
 
 
-def write_pictures(
-    folder: Path,
-    name: str,
-    *,
-    prediction: Tensor,
-    reference: Tensor,
-    epsilon: float,
-    exposure: float,
-    mape: float,
-) -> None:
-    """Writes `{name}_prediction.png`, `_reference.png`, `_error.png` and the triptych `{name}.png`.
-
-    prediction, reference: [H, W, 3] linear radiance; mape: for the triptych's label. The error
-    map's PNG carries as text what it shows ("scale"), its "colour_map", and the "maximum" where
-    that ends.
-    """
-    folder.mkdir(parents=True, exist_ok=True)
-    panels = Panels.of(prediction, reference, epsilon=epsilon, exposure=exposure)
-    scale = PngInfo()
-    scale.add_text("scale", f"|prediction - reference| / (reference + {epsilon:g}), mean of RGB")
-    scale.add_text("colour_map", COLOUR_MAP)
-    scale.add_text("maximum", f"{ERROR_RANGE:g}")
-    for kind, picture in vars(panels).items():
-        picture.save(folder / f"{name}_{kind}.png", pnginfo=scale if kind == "error" else None)
-    panels.triptych(mape=mape).save(folder / f"{name}.png")
-
-
 @dataclass(frozen=True)
 class Panels:
     """A frame's pictures, all of one size."""
@@ -77,6 +50,22 @@ class Panels:
             srgb_picture(reference, exposure),
             Image.fromarray(error_picture(prediction, reference, epsilon)),
         )
+
+    def write(self, folder: Path, name: str, *, epsilon: float, mape: float) -> None:
+        """Writes `{name}_prediction.png`, `_reference.png`, `_error.png`, and the triptych.
+
+        epsilon, mape: of the error map, whose PNG carries as text what it shows ("scale"), its
+        "colour_map", and the "maximum" where that ends
+        """
+        folder.mkdir(parents=True, exist_ok=True)
+        scale = PngInfo()
+        shown = f"|prediction - reference| / (reference + {epsilon:g}), mean of RGB"
+        scale.add_text("scale", shown)
+        scale.add_text("colour_map", COLOUR_MAP)
+        scale.add_text("maximum", f"{ERROR_RANGE:g}")
+        for kind, picture in vars(self).items():
+            picture.save(folder / f"{name}_{kind}.png", pnginfo=scale if kind == "error" else None)
+        self.triptych(mape=mape).save(folder / f"{name}.png")
 
     def triptych(self, *, mape: float, name: str = "") -> Image.Image:
         """Side by side under labels, then the error map's colour bar. name: of the frame"""

@@ -106,8 +106,8 @@ def test_as_much_is_kept_as_there_is_room_for(
     if kept:
         prediction, reference = read_linear(folder, "hard", 3)
         tolerance = {"rtol": 1e-3 if kept == "half" else 0.0, "atol": 0.0}
-        torch.testing.assert_close(prediction, evaluation.predictions[3], **tolerance)
-        torch.testing.assert_close(reference, evaluation.references[3].radiance, **tolerance)
+        torch.testing.assert_close(prediction, evaluation.frames[3].prediction, **tolerance)
+        torch.testing.assert_close(reference, evaluation.frames[3].reference.radiance, **tolerance)
 
 
 @pytest.fixture

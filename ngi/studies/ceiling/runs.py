@@ -110,11 +110,9 @@ def _tail(evaluation: Evaluation, name: str) -> float:
     log: Callable[[Tensor], Tensor] = lambda radiance: radiance.clamp(min=0).log1p()  # noqa: E731
     errors = torch.cat(
         [
-            (log(prediction) - log(reference.radiance)).abs().mean(dim=-1).flatten()
-            for frame, prediction, reference in zip(
-                evaluation.frames, evaluation.predictions, evaluation.references, strict=True
-            )
-            if frame.set == name
+            (log(each.prediction) - log(each.reference.radiance)).abs().mean(dim=-1).flatten()
+            for each in evaluation.frames
+            if each.frame.set == name
         ]
     )
     return errors.topk(math.ceil(TAIL * len(errors))).values.mean().item()
