@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from ngi.machine.backend import mi
 from ngi.render.materials import Material
 from ngi.scene.kinds import (
     Direction,
@@ -12,6 +11,7 @@ from ngi.scene.kinds import (
     Roughness,
     Translation,
 )
+from ngi.scene.scene_parameters import emits
 from ngi.scene.variable import Variable
 from ngi.scene.variable_scene import VariableScene
 
@@ -54,7 +54,7 @@ def _rare(scene: VariableScene, materials: list[Material]) -> list[str]:
     lights = [
         "+".join(variable.objects)
         for variable in variables
-        if _moves_or_goes_out(variable) and any(map(_emits, scene.owners(variable)))
+        if _moves_or_goes_out(variable) and any(map(emits, scene.owners(variable)))
     ]
     if not lights:
         return []
@@ -69,10 +69,6 @@ def _moves_or_goes_out(variable: Variable) -> bool:
     if isinstance(variable, Intensity):
         return min(variable.minimum) == 0
     return isinstance(variable, MOVES)
-
-
-def _emits(owner: mi.Object) -> bool:
-    return isinstance(owner, mi.Emitter) or (isinstance(owner, mi.Shape) and owner.is_emitter())
 
 
 def _polishes(variable: Variable) -> bool:

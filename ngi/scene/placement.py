@@ -12,13 +12,24 @@ from ngi.scene.variable import Values, Write
 
 
 class Body(Protocol):
-    """What a placement moves: something with a to_world, or the vertices of a mesh."""
+    """What a placement moves: something with a to_world, a point, or the vertices of a mesh.
 
-    @property
-    def origin(self) -> NDArray[np.float64]: ...
+    key: of the parameter that says where it is
+    origin: [3], of the authored to_world
+    """
+
+    key: str
+    origin: Values
+
     def move(self, matrix: transforms.Matrix) -> None: ...
-    def place(self, to_world: Values) -> None: ...
-    def reshape(self, positions: Values, normals: Values | None) -> None: ...
+
+    def place(self, to_world: Values) -> None:  # noqa: ARG002
+        raise ValueError(
+            f"scene.yaml: {self.key}: only what has a to_world can be placed by a matrix"
+        )
+
+    def reshape(self, positions: Values, normals: Values | None) -> None:  # noqa: ARG002
+        raise ValueError(f"scene.yaml: {self.key}: only a mesh outside of any group has key frames")
 
 
 class Placement:

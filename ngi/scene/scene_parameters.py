@@ -9,7 +9,7 @@ from ngi.machine.backend import mi
 from ngi.scene.assets import Bitmap, load_vertices
 from ngi.scene.bodies import Emission, Positioned, Transformed, Vertices
 from ngi.scene.parameters import Parameters
-from ngi.scene.placement import Placement, parking
+from ngi.scene.placement import Body, Placement, parking
 from ngi.scene.scene_files import SceneFile
 from ngi.scene.variable import Values, Write
 
@@ -53,7 +53,7 @@ class SceneParameters(Parameters):
             )
         return self._placements[object_id]
 
-    def _body(self, object_id: str, owner: mi.Object) -> Positioned | Transformed | Vertices:
+    def _body(self, object_id: str, owner: mi.Object) -> Body:
         # Not every mi.Mesh is one of vertices: a rectangle has a to_world.
         if isinstance(owner, mi.Mesh) and owner.class_name() != "Rectangle":
             return Vertices(self, object_id)

@@ -86,9 +86,9 @@ class Variable(ABC):
     """What of the buffers it can change: position, albedo, roughness, emission; camera: all."""
 
     @property
-    @abstractmethod
     def components(self) -> tuple[str, ...]:
-        """Names of its components of v. A single component has an empty name."""
+        """Names of its components of v. A single component, as most have, has an empty name."""
+        return ("",)
 
     @abstractmethod
     def value(self, components: Values) -> Values:
@@ -186,10 +186,6 @@ class DiscreteVariable(Variable):
     """
 
     choices: tuple[str, ...]
-
-    @property
-    def components(self) -> tuple[str, ...]:
-        return ("",)
 
     def value(self, components: Values) -> Values:
         """[1]: the index min(floor(u * n), n - 1)."""

@@ -116,8 +116,13 @@ class Shape(DiscreteVariable):
     kind = "shape"
     affects = frozenset({"position"})
 
+    @property
+    def shown(self) -> tuple[str, ...]:
+        """Ids of the objects, in the order of the choices."""
+        return self.choices
+
     def bind(self, scene: LoadedScene) -> Write:
-        switches = [scene.placement(object_id).switch() for object_id in self.choices]
+        switches = [scene.placement(object_id).switch() for object_id in self.shown]
 
         def write(value: Values) -> None:
             for index, switch in enumerate(switches):
@@ -138,10 +143,6 @@ class KeyFrames(Variable):
 
     kind = "key_frames"
     affects = frozenset({"position"})
-
-    @property
-    def components(self) -> tuple[str, ...]:
-        return ("",)
 
     @property
     def range(self) -> str:

@@ -34,10 +34,7 @@ class LookAt(RangedVariable):
     numbers = VIEW
 
     def bind_one(self, scene: LoadedScene, object_id: str) -> Write:
-        placement = scene.placement(object_id, only=CAMERAS)
-        return lambda view: placement.place(
-            transforms.look_at(view[:3], view[3:], np.array(self.up))
-        )
+        return _looking(scene, object_id, self.up)
 
     @classmethod
     def read_options(cls, objects: tuple[str, ...], keys: YamlKeys) -> dict[str, Any]:  # noqa: ARG003
@@ -64,10 +61,6 @@ class CameraPath(Variable):
     affects = frozenset({"camera"})
 
     @property
-    def components(self) -> tuple[str, ...]:
-        return ("",)
-
-    @property
     def range(self) -> str:
         return f"{len(self.keys)} views"
 
@@ -78,11 +71,7 @@ class CameraPath(Variable):
         return view
 
     def bind(self, scene: LoadedScene) -> Write:
-        (object_id,) = self.objects
-        placement = scene.placement(object_id, only=CAMERAS)
-        return lambda view: placement.place(
-            transforms.look_at(view[:3], view[3:], np.array(self.up))
-        )
+        return _looking(scene, self.objects[0], self.up)
 
     @classmethod
     def read(cls, objects: tuple[str, ...], keys: YamlKeys) -> Self:
@@ -122,3 +111,9 @@ class Direction(RangedVariable):
             placement.place(place @ transforms.look_at(np.zeros(3), -towards, np.array(UP)))
 
         return write
+
+
+def _looking(scene: LoadedScene, camera: str, up: Vector) -> Write:
+    """A function that places a camera by origin and target, [6]."""
+    placement = scene.placement(camera, only=CAMERAS)
+    return lambda view: placement.place(transforms.look_at(view[:3], view[3:], np.array(up)))

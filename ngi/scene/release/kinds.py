@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ngi.scene.kinds import Shape
-from ngi.scene.variable import LoadedScene, RangedVariable, Values, Write
+from ngi.scene.variable import LoadedScene, RangedVariable, Write
 
 NOTHING = "nothing"
 
@@ -46,11 +46,6 @@ class Alternatives(Shape):
 
     kind = "alternatives"
 
-    def bind(self, scene: LoadedScene) -> Write:
-        switches = [scene.placement(object_id).switch() for object_id in self.choices[:-1]]
-
-        def write(value: Values) -> None:
-            for index, switch in enumerate(switches):
-                switch(np.array([float(index == value[0])]))
-
-        return write
+    @property
+    def shown(self) -> tuple[str, ...]:
+        return self.choices[:-1]
