@@ -43,7 +43,7 @@ WAY = {
     "Measure": (
         Verb(
             "costs",
-            "ngi.commands.costs",
+            "ngi.studies.costs",
             "what steps cost here, to count run time fairly when training",
         ),
         Verb("metrics", "ngi.commands.metrics", "metrics again, from a run's linear pictures"),

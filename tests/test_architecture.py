@@ -196,7 +196,7 @@ def test_no_constructor_takes_a_configuration() -> None:
         if starts_with(set(imports(file)), "hydra", "omegaconf")
     }
     assert {name for name in users if not name.startswith("ngi.config.")} == {
-        "ngi.commands.costs",
+        "ngi.studies.costs",
         "ngi.methods.path_tracing.run",
         "ngi.studies.ceiling.__main__",
         "ngi.studies.ceiling.campaign",

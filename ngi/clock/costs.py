@@ -9,7 +9,7 @@ for which the chains' current states are scored too. What they cost is put toget
 - scoring: all that a scored step takes more than one that is not (score).
 
 A component is known by the settings that it depends on and by nothing else, and it is measured once
-(`ngi.learn.step_costs`). What two methods share has therefore the same cost in both, and noise
+(`ngi.studies.step_costs`). What two methods share has therefore the same cost in both, and noise
 of the measurement cannot decide between them. What is not told apart: where in the scene the chains
 are, the resolution that patches are cut from (64 to 600 pixels: within 4 % of 128 on two scenes),
 and how full the store is.

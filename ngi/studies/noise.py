@@ -17,13 +17,13 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig, open_dict
 from tabulate import tabulate
 
-from ngi.commands.costs import in_this_process
 from ngi.config.build import build_network, build_samples
 from ngi.config.command_words import completed, with_overrides
 from ngi.config.configuration import register
 from ngi.config.hydra_program import MESSAGES, fail, run_program
 from ngi.config.values import check_values
 from ngi.files.resources import root
+from ngi.studies.costs import in_this_process
 
 if TYPE_CHECKING:
     from torch import Tensor

@@ -46,7 +46,7 @@ def test_of_what_does_not_exist_the_nearest_is_named(word: str, message: str) ->
     assert message in explained(raised.value)
 
 
-@pytest.mark.parametrize("module", ["ngi.train", "ngi.commands.costs", "ngi.studies.noise"])
+@pytest.mark.parametrize("module", ["ngi.train", "ngi.studies.costs", "ngi.studies.noise"])
 def test_a_mistyped_key_is_said_in_one_line_and_leaves_nothing(module: str, tmp_path: Path) -> None:
     words = ("renderer=analytic", "budget=smoke", "model.hidden_feature=64")
     status, output = run_module(module, *words, folder=tmp_path)
@@ -82,7 +82,7 @@ def test_an_error_of_a_run_is_said_once_and_kept_where_the_run_is(
 
 
 def test_an_error_of_what_is_measured_is_said_once(tmp_path: Path) -> None:
-    status, output = run_module("ngi.commands.costs", *SMALL, "seed=maybe", folder=tmp_path)
+    status, output = run_module("ngi.studies.costs", *SMALL, "seed=maybe", folder=tmp_path)
     assert status == 1
     assert output.count("seed: 'maybe' is not an integer") == 1
 

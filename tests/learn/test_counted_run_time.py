@@ -10,11 +10,11 @@ import pytest
 import torch
 from omegaconf import DictConfig
 
-from ngi.commands import costs as costs_command
 from ngi.config.build import run_components
 from ngi.learn import CostFile, TrainingStream
 from ngi.machine.usage import COLUMNS
 from ngi.render import AnalyticRenderer
+from ngi.studies import costs as costs_command
 from ngi.train import train
 from tests.learn.command_line import SIZE
 from tests.learn.comparison import assert_same

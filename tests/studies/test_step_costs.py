@@ -1,7 +1,7 @@
 from ngi.clock.phase_clock import PHASES
 from ngi.learn import PatchSamples
-from ngi.learn.step_costs import TimedStep, rendering_seconds, step_seconds
 from ngi.render import AnalyticRenderer
+from ngi.studies.step_costs import TimedStep, rendering_seconds, step_seconds
 
 
 def step(*, generated: bool = False, scored: bool = False, **seconds: float) -> TimedStep:

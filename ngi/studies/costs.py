@@ -67,8 +67,8 @@ def measure(config: DictConfig) -> None:
 def _measure(
     config: DictConfig, missing: list[Component], *, renderer: Renderer, file: CostFile
 ) -> None:
-    from ngi.learn.step_costs import rendering_seconds
     from ngi.machine.provenance import provenance
+    from ngi.studies.step_costs import rendering_seconds
 
     _warn_if_busy()
     for component in missing:
@@ -92,15 +92,15 @@ def _step_seconds(
 ) -> dict[str, dict[str, list[float]]]:
     """Trains for a few seconds, with steps of all kinds in turn."""
     from ngi import learn
-    from ngi.learn.step_costs import StepTimer, step_seconds
     from ngi.render import AnalyticRenderer
+    from ngi.studies.step_costs import StepTimer, step_seconds
 
     stand_in = AnalyticRenderer(
         dimensions=renderer.dimensions, patch_size=renderer.patch_size, layout=renderer.layout
     )
     config = config.copy()
     with open_dict(config):
-        here = "ngi.learn.step_costs"
+        here = "ngi.studies.step_costs"
         config.reuse.policy = {"_target_": f"{here}.InTurn"}
         if "acceptance" in config.sampler:
             config.sampler.acceptance = {"_target_": f"{here}.ScoredInTurn", "scored": scored}
