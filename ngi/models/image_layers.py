@@ -39,20 +39,26 @@ class ImageLinear:
     def __call__(self, *parts: Tensor, negative_slope: float | None = None) -> Tensor:
         """Features, if any, and `layer_inputs` of p pixels to [p, out].
 
-        negative_slope: of a leaky ReLU behind the product, if any
-
-        On a CPU this is one call of oneDNN, the one that PyTorch's own compiler makes: it saves a
-        pass over memory, and in float32 PyTorch would ask MKL, which is slow on AMD's processors.
+        negative_slope: see `activated_linear`
         """
         x = torch.cat(parts, dim=1)
-        if x.device.type == "cpu" and computed_by_onednn(x.dtype):
-            after = ("none", []) if negative_slope is None else ("leaky_relu", [negative_slope])
-            fused: Tensor = torch.ops.mkldnn._linear_pointwise(
-                x, self.weight, self.bias, *after, ""
-            )
-            return fused
-        output = F.linear(x, self.weight, self.bias)
-        return output if negative_slope is None else F.leaky_relu_(output, negative_slope)
+        return activated_linear(x, self.weight, self.bias, negative_slope=negative_slope)
+
+
+def activated_linear(
+    x: Tensor, weight: Tensor, bias: Tensor | None, *, negative_slope: float | None
+) -> Tensor:
+    """As `F.linear`, with a leaky ReLU of this slope behind it, if any.
+
+    On a CPU this is one call of oneDNN, the one that PyTorch's own compiler makes: it saves a pass
+    over memory, and in float32 PyTorch would ask MKL, which is slow on AMD's processors.
+    """
+    if x.device.type == "cpu" and computed_by_onednn(x.dtype):
+        after = ("none", []) if negative_slope is None else ("leaky_relu", [negative_slope])
+        fused: Tensor = torch.ops.mkldnn._linear_pointwise(x, weight, bias, *after, "")
+        return fused
+    output = F.linear(x, weight, bias)
+    return output if negative_slope is None else F.leaky_relu_(output, negative_slope)
 
 
 def layer_inputs(x: Tensor, precision: torch.dtype) -> Tensor:

@@ -108,18 +108,12 @@ class PixelGenerator(nn.Module):
         return add_known_light(output.unflatten(1, buffers.shape[1:3]), buffers, self.layout)
 
     @torch.no_grad()
-    def render(
-        self, buffers: Tensor, scene_vector: Tensor, pixels_per_chunk: int | None = None
-    ) -> Tensor:
+    def render(self, buffers: Tensor, scene_vector: Tensor) -> Tensor:
         """A whole image, [H, W, C] and v [D] to log1p radiance [H, W, 3], in chunks of pixels.
 
         The same as `forward` up to rounding, which under bfloat16 happens less often here (see
         `ImageLinear`). The chunks bound the memory and do not change the result. Keeps no gradient.
-
-        pixels_per_chunk: None for as many as are fastest
         """
-        if pixels_per_chunk is not None and pixels_per_chunk < 1:
-            raise ValueError(f"pixels_per_chunk is {pixels_per_chunk}: it must be at least 1")
         check_inputs(
             buffers[None],
             scene_vector[None],
@@ -130,7 +124,7 @@ class PixelGenerator(nn.Module):
         precision = self.input_layer.weight.dtype
         if torch.is_autocast_enabled(device) and precision == torch.float32:
             precision = torch.get_autocast_dtype(device)
-        size = pixels_per_chunk or (CACHED_PIXELS if device == "cpu" else MANY_PIXELS)
+        size = CACHED_PIXELS if device == "cpu" else MANY_PIXELS
         with torch.autocast(device, enabled=False):
             layers = [
                 ImageLinear.of(layer, scene_vector, precision)

@@ -8,7 +8,6 @@ weight, so that neither it nor its gradient takes a pass of its own.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -17,7 +16,7 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 from torch.autograd.function import once_differentiable
 
-from ngi.models.image_layers import ALIGNMENT, computed_by_onednn
+from ngi.models.image_layers import ALIGNMENT, activated_linear
 from ngi.models.patch_linear import SampleGradients
 
 NEGATIVE_SLOPE = 0.01
@@ -187,16 +186,6 @@ def _forward(
         if number == skip:
             features = torch.cat([features, pixels.flatten(0, 1)], dim=1)
         inputs.append(features)
-        features = _layer(features, weight, bias, activated=number < layers - 1)
+        slope = NEGATIVE_SLOPE if number < layers - 1 else None
+        features = activated_linear(features, weight, bias, negative_slope=slope)
     return features, weights, inputs
-
-
-def _layer(features: Tensor, weight: Tensor, bias: Tensor | None, *, activated: bool) -> Tensor:
-    if features.device.type == "cpu" and computed_by_onednn(features.dtype):
-        after: tuple[str, Sequence[float]] = ("none", [])
-        if activated:
-            after = ("leaky_relu", [NEGATIVE_SLOPE])
-        fused: Tensor = torch.ops.mkldnn._linear_pointwise(features, weight, bias, *after, "")
-        return fused
-    output = F.linear(features, weight, bias)
-    return F.leaky_relu_(output, NEGATIVE_SLOPE) if activated else output

@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from ngi.models import PixelGenerator, image_layers, pixel_mlp
+from ngi.models import PixelGenerator, image_layers
 from ngi.patches import BufferLayout
 
 CASES = [
@@ -19,8 +19,7 @@ CASES = [
 @pytest.fixture(params=[True, False], ids=["onednn", "pytorch"])
 def library(request, monkeypatch) -> None:
     if not request.param:
-        for module in (image_layers, pixel_mlp):
-            monkeypatch.setattr(module, "computed_by_onednn", lambda _: False)
+        monkeypatch.setattr(image_layers, "computed_by_onednn", lambda _: False)
 
 
 @pytest.mark.parametrize("options", CASES)

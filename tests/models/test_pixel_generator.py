@@ -4,7 +4,7 @@ import pytest
 import torch
 from torch import nn
 
-from ngi.models import PatchLinear, PixelGenerator
+from ngi.models import PatchLinear, PixelGenerator, pixel_generator
 from ngi.patches import BUFFER_CHANNELS, BufferLayout
 
 from .conftest import plain_forward
@@ -120,11 +120,12 @@ def test_direct_light_is_an_input_and_is_added_as_radiance(make_model, make_batc
 @pytest.mark.parametrize("names", [("position", "emission"), ("position", "direct", "emission")])
 @pytest.mark.parametrize("pixels_per_chunk", [1, 7, 30, 1000])
 def test_rendering_in_chunks_changes_nothing(
-    make_model, make_batch, pixels_per_chunk, names
+    make_model, make_batch, pixels_per_chunk, names, monkeypatch
 ) -> None:
+    monkeypatch.setattr(pixel_generator, "CACHED_PIXELS", pixels_per_chunk)
     model = make_model(names=names).double()
     batch = make_batch(model, samples=1)
-    image = model.render(batch.buffers[0], batch.scene_vector[0], pixels_per_chunk)
+    image = model.render(batch.buffers[0], batch.scene_vector[0])
     assert not image.requires_grad
     expected = model(batch.buffers, batch.scene_vector)[0].detach()
     torch.testing.assert_close(image, expected, rtol=1e-13, atol=1e-14)
@@ -186,5 +187,3 @@ def test_inputs_of_the_wrong_shape_are_named(make_model, make_batch) -> None:
         model(batch.buffers, batch.scene_vector[:1])
     with pytest.raises(ValueError, match=r"expected \[n, H, W, 10\]"):
         model(batch.buffers[..., :9], batch.scene_vector)
-    with pytest.raises(ValueError, match="pixels_per_chunk is 0"):
-        model.render(batch.buffers[0], batch.scene_vector[0], 0)

@@ -12,7 +12,7 @@ from ngi.studies.benchmark.store import store
 def test_operations_are_those_that_pytorch_counts(
     learner: training.Learner, padding: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    fused = "ngi.models.pixel_mlp.computed_by_onednn"
+    fused = "ngi.models.image_layers.computed_by_onednn"
     monkeypatch.setattr(fused, lambda _: False)  # PyTorch does not count oneDNN's fused layers
     network = learner.network(
         layout=learner.layout, scene_dimensions=3, hidden_features=64, hidden_layers=4
