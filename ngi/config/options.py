@@ -6,6 +6,7 @@ import re
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import MISSING, Field, field, fields
+from pathlib import Path
 from typing import Any, NoReturn, TypeVar, cast
 
 from pydantic import TypeAdapter, ValidationError
@@ -57,6 +58,14 @@ def _with_key(words: Sequence[str], key: str, kind: str) -> list[str]:
     if bare and kind.startswith("list"):
         return [f"{key}={','.join(bare)}", *rest]
     return [*(f"{key}={word}" for word in bare[:1]), *bare[1:], *rest]
+
+
+def check_output(out: Path, *suffixes: str) -> None:
+    """ValueError for a file that ends with none of these, or whose folder is not there."""
+    if out.suffix not in suffixes:
+        raise ValueError(f"out: '{out}' does not end with {' or '.join(suffixes)}")
+    if not out.parent.is_dir():
+        raise ValueError(f"out: there is no folder {out.parent}")
 
 
 def run_tool(

@@ -39,9 +39,8 @@ def view(options: ViewOptions) -> None:
     from ngi.view.subject import subject
     from ngi.view.trained_run import TrainedRun
 
-    scene = None if options.scene is None else Path(options.scene)
     try:
-        run = TrainedRun.open(Path(options.run), scene_path=scene)
+        run = TrainedRun.open(Path(options.run), scene_path=options.scene)
     except (ValueError, OSError, RuntimeError) as error:
         print(error, file=sys.stderr)
         with closing(ErrorPage(str(error), host=options.host, port=options.port)) as page:

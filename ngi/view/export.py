@@ -9,7 +9,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ngi.config.options import option, run_tool
+from ngi.config.options import check_output, option, run_tool
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -45,10 +45,7 @@ class ExportOptions:
 def export(options: ExportOptions) -> None:
     """Writes the file; ValueError or OSError for what is wrong, and then nothing is written."""
     out = Path(options.out)
-    if out.suffix != SUFFIX:
-        raise ValueError(f"out: '{out}' does not end with {SUFFIX}")
-    if not out.parent.is_dir():
-        raise ValueError(f"out: there is no folder {out.parent}")
+    check_output(out, SUFFIX)
     if missing := [name for name in PACKAGES if find_spec(name) is None]:
         raise ValueError(f"{', '.join(missing)} missing: pip install -e .[export]")
     from ngi.files.durable import write_atomically
@@ -56,9 +53,7 @@ def export(options: ExportOptions) -> None:
     from ngi.view.network_metadata import network_metadata
     from ngi.view.trained_run import TrainedRun
 
-    run = TrainedRun.open(
-        Path(options.run), scene_path=None if options.scene is None else Path(options.scene)
-    )
+    run = TrainedRun.open(Path(options.run), scene_path=options.scene)
     with closing(run.renderer):
         if not isinstance(run.network, ImageNetwork):
             raise ValueError(

@@ -10,34 +10,25 @@ from typing import Any
 from torch import Tensor
 
 from ngi.denoise import Denoiser, OpenImageDenoise, OptixDenoise
-from ngi.evaluate import EvaluationProtocol
 from ngi.methods.path_tracing import PathTracing
-from ngi.render import Renderer
-from ngi.scene import SceneDescription
-from ngi.view.run_settings import describe_scene, make_renderer, plain, read_settings
+from ngi.view.run_settings import OpenedRun, opened, read_settings
 from ngi.view.trained_run import TrainedRun
 
 DENOISERS = {f"ngi.denoise.{kind.__name__}": kind for kind in (OpenImageDenoise, OptixDenoise)}
 
 
-@dataclass(frozen=True)
-class PathTracedRun:
+@dataclass(frozen=True, kw_only=True)
+class PathTracedRun(OpenedRun):
     """Frames of a run of `ngi.denoise`, with the samples per pixel that it had.
 
     step: of training, 0
-    description: of its scene; None for closed formulas
     """
 
-    folder: Path
-    scene_name: str
-    protocol: EvaluationProtocol
-    description: SceneDescription | None
-    renderer: Renderer
     path_tracing: PathTracing
     step: int = 0
 
     @classmethod
-    def open(cls, folder: Path, *, scene_path: Path | None = None) -> PathTracedRun:
+    def open(cls, folder: Path, *, scene_path: Path | str | None = None) -> PathTracedRun:
         """Loads a finished run; nothing of it is changed or executed.
 
         scene_path: of a scene in the authors' format; others are known by name.
@@ -49,16 +40,11 @@ class PathTracedRun:
         if not (result := folder / "result.json").exists():
             raise FileNotFoundError(f"{result}: no such file; the run is not finished yet")
         denoiser = _denoiser(settings["path_tracing"]["denoiser"])
-        description = describe_scene(folder, settings, scene_path)
-        renderer = make_renderer(folder, settings, description)
+        run = opened(folder, settings, scene_path)
         return cls(
-            folder=folder,
-            scene_name=settings["scene"]["name"],
-            protocol=EvaluationProtocol(**plain(settings["evaluation"]["evaluator"]["protocol"])),
-            description=description,
-            renderer=renderer,
+            **run,
             path_tracing=PathTracing(
-                renderer=renderer,
+                renderer=run["renderer"],
                 denoiser=denoiser,
                 samples_per_pixel=json.loads(result.read_text())["frame"]["samples_per_pixel"],
                 seed=settings["seed"],
@@ -70,7 +56,7 @@ class PathTracedRun:
         return self.path_tracing.radiance(scene_vector, resolution=resolution)
 
 
-def open_run(folder: Path, *, scene_path: Path | None = None) -> TrainedRun | PathTracedRun:
+def open_run(folder: Path, *, scene_path: Path | str | None = None) -> TrainedRun | PathTracedRun:
     """Whichever of the two the folder holds; raises what their `open` raises."""
     kind = PathTracedRun if "path_tracing" in read_settings(folder) else TrainedRun
     return kind.open(folder, scene_path=scene_path)

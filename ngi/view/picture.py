@@ -10,7 +10,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from ngi.config.options import option, run_tool
+from ngi.config.options import check_output, option, run_tool
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -50,15 +50,10 @@ def write_picture(options: PictureOptions) -> None:
     from ngi.view.trained_run import TrainedRun
 
     out = Path(options.out)
-    if out.suffix not in SUFFIXES:
-        raise ValueError(f"out: '{out}' ends with neither of {' and '.join(SUFFIXES)}")
-    if not out.parent.is_dir():
-        raise ValueError(f"out: there is no folder {out.parent}")
+    check_output(out, *SUFFIXES)
     if not options.resolution >= 1 or not options.reference >= 0:
         raise ValueError("resolution has to be at least 1, reference at least 0")
-    run = TrainedRun.open(
-        Path(options.run), scene_path=None if options.scene is None else Path(options.scene)
-    )
+    run = TrainedRun.open(Path(options.run), scene_path=options.scene)
     with closing(run.renderer):
         v = _scene_vector(options, run.renderer)
         begin = perf_counter()

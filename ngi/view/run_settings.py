@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from hydra.utils import get_object
 from omegaconf import DictConfig, OmegaConf
 
+from ngi.evaluate import EvaluationProtocol
 from ngi.files.resources import root
 from ngi.learn import PatchSamples, Samples
 from ngi.render import Renderer
@@ -29,6 +31,36 @@ RENAMED = {
     "ngi.learn.Sequences": "ngi.methods.anf.Sequences",
 }
 """What older runs call something -> what it is called now."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class OpenedRun:
+    """What the folder of any run tells.
+
+    protocol: that its evaluations measured by
+    description: of its scene; None for closed formulas
+    """
+
+    folder: Path
+    scene_name: str
+    protocol: EvaluationProtocol
+    description: SceneDescription | None
+    renderer: Renderer
+
+
+def opened(folder: Path, settings: dict[str, Any], scene_path: Path | str | None) -> dict[str, Any]:
+    """The fields of an `OpenedRun`; raises as `describe_scene` and `make_renderer` do.
+
+    scene_path: see `describe_scene`
+    """
+    description = describe_scene(folder, settings, scene_path)
+    return {
+        "folder": folder,
+        "scene_name": settings["scene"]["name"],
+        "protocol": EvaluationProtocol(**plain(settings["evaluation"]["evaluator"]["protocol"])),
+        "description": description,
+        "renderer": make_renderer(folder, settings, description),
+    }
 
 
 def read_settings(folder: Path) -> dict[str, Any]:
@@ -82,7 +114,7 @@ def plain(arguments: dict[str, Any]) -> dict[str, Any]:
 
 
 def describe_scene(
-    folder: Path, settings: dict[str, Any], path: Path | None
+    folder: Path, settings: dict[str, Any], path: Path | str | None
 ) -> SceneDescription | None:
     """What varies in the run's scene; None where it is made of closed formulas.
 

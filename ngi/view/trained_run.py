@@ -10,20 +10,10 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-from ngi.evaluate import EvaluationProtocol
 from ngi.files.durable import DamagedError
 from ngi.learn import Samples, network_of, read_checkpoint
 from ngi.machine.captured import Captured, Function
-from ngi.render import Renderer
-from ngi.scene import SceneDescription
-from ngi.view.run_settings import (
-    describe_scene,
-    made_by,
-    make_renderer,
-    make_samples,
-    plain,
-    read_settings,
-)
+from ngi.view.run_settings import OpenedRun, made_by, make_samples, opened, plain, read_settings
 
 RECORDS = "ngi.learn.graph_trainer.GraphTrainer"
 """The trainer that has a run's steps recorded."""
@@ -33,33 +23,26 @@ NETWORK, AVERAGED = "network.", "averaged.module."
 """What the names of the network's weights, and of their average, begin with in a checkpoint."""
 
 
-@dataclass(frozen=True)
-class TrainedRun:
+@dataclass(frozen=True, kw_only=True)
+class TrainedRun(OpenedRun):
     """The network as the newest checkpoint of a run has it, and the renderer of its scene.
 
     Its weights are the averaged ones where the run has such, as in its evaluations.
 
     step: training steps it has had
     precision: as Lightning names that of training, which is that of `predict` too
-    protocol: that its evaluations measured by
-    description: of its scene; None for closed formulas
     samples: what the network was trained on, which says what it is given
     image: its `render`, as a tuple, recorded as CUDA graphs where the run's steps were
     """
 
-    folder: Path
-    scene_name: str
     step: int
     precision: str
-    protocol: EvaluationProtocol
-    description: SceneDescription | None
-    renderer: Renderer
     samples: Samples
     network: nn.Module
     image: Function
 
     @classmethod
-    def open(cls, folder: Path, *, scene_path: Path | None = None) -> TrainedRun:
+    def open(cls, folder: Path, *, scene_path: Path | str | None = None) -> TrainedRun:
         """Loads a finished, interrupted or running run; nothing of it is changed or executed.
 
         scene_path: of a scene in the authors' format; others are known by name.
@@ -75,22 +58,17 @@ class TrainedRun:
                 "`ngi video` shows its frames"
             )
         checkpoint = newest_checkpoint(folder)
-        description = describe_scene(folder, settings, scene_path)
-        renderer = make_renderer(folder, settings, description)
-        samples = make_samples(settings, renderer)
+        run = opened(folder, settings, scene_path)
+        samples = make_samples(settings, run["renderer"])
         make = partial(made_by(settings, "model"), **plain(settings["model"]))
         network = network_of(samples, make)
         network.load_state_dict(trained_weights(checkpoint["state_dict"]))
         device = "cuda" if torch.cuda.is_available() else "cpu"
         network = network.to(device).eval()
         return cls(
-            folder=folder,
-            scene_name=settings["scene"]["name"],
+            **run,
             step=checkpoint["global_step"],
             precision=settings["trainer"]["precision"],
-            protocol=EvaluationProtocol(**plain(settings["evaluation"]["evaluator"]["protocol"])),
-            description=description,
-            renderer=renderer,
             samples=samples,
             network=network,
             image=_image(network, recorded=settings["trainer"]["_target_"] == RECORDS),

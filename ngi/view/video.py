@@ -11,7 +11,7 @@ from os.path import relpath
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ngi.config.options import option, run_tool
+from ngi.config.options import check_output, option, run_tool
 
 if TYPE_CHECKING:
     from ngi.view.film import Film, Measured
@@ -75,11 +75,8 @@ def _out(options: VideoOptions) -> Path:
 
 
 def _check(options: VideoOptions) -> None:
-    out = _out(options)
-    if out.suffix != ".mp4":
-        raise ValueError(f"out: '{out}' does not end with .mp4")
-    if options.out is not None and not out.parent.is_dir():
-        raise ValueError(f"out: there is no folder {out.parent}")
+    if options.out is not None:
+        check_output(Path(options.out), ".mp4")
     if not options.resolution >= 1 or not options.frames_per_second >= 1:
         raise ValueError("resolution and frames_per_second have to be at least 1")
     if options.reference < 0 or options.reference % 2:
@@ -94,12 +91,11 @@ def _film(options: VideoOptions, stack: ExitStack) -> Film:
     from ngi.view.path_traced_run import open_run
     from ngi.view.scene_vectors import along, key_frames
 
-    scene = None if options.scene is None else Path(options.scene)
     runs: list[TrainedRun | PathTracedRun] = []
     for folder in map(Path, (options.run, *(options.beside or ()))):
         if folder.resolve() in (run.folder.resolve() for run in runs):
             raise ValueError(f"beside: {folder} is there already")
-        run = open_run(folder, scene_path=scene)
+        run = open_run(folder, scene_path=options.scene)
         stack.enter_context(closing(run.renderer))
         if run.renderer.scene_hash != (runs or [run])[0].renderer.scene_hash:
             raise ValueError(
