@@ -13,32 +13,19 @@ from ngi.machine.energy import EnergyMeter, energy_counters
 if TYPE_CHECKING:  # PyTorch and Lightning take seconds that --help need not wait for
     from torch import nn
 
-    from ngi.learn import (
-        Budget,
-        Component,
-        Costs,
-        IlluminationModule,
-        Interruption,
-        PhaseClock,
-        Recorder,
-        Run,
-        RunFolder,
-        Samples,
-        Tracker,
-        TrainingStream,
-    )
+    from ngi import learn
     from ngi.render import Renderer
 
 
-def build_samples(config: DictConfig, *, renderer: Renderer) -> Samples:
+def build_samples(config: DictConfig, *, renderer: Renderer) -> learn.Samples:
     """What the run's training samples are."""
-    samples: Samples = instantiate(config.data)(renderer=renderer)
+    samples: learn.Samples = instantiate(config.data)(renderer=renderer)
     return samples
 
 
 def build_stream(
-    config: DictConfig, *, samples: Samples, clock: PhaseClock, patches: Path
-) -> TrainingStream:
+    config: DictConfig, *, samples: learn.Samples, clock: learn.PhaseClock, patches: Path
+) -> learn.TrainingStream:
     """The stream of training batches. patches: folder that its store is archived in."""
     from ngi.learn import TrainingStream
     from ngi.reuse import PatchArchive, Reuse
@@ -60,7 +47,7 @@ def build_stream(
     )
 
 
-def build_network(config: DictConfig, *, samples: Samples) -> nn.Module:
+def build_network(config: DictConfig, *, samples: learn.Samples) -> nn.Module:
     """The network for these samples, its weights as they are before the first step."""
     from ngi import learn
 
@@ -76,8 +63,8 @@ def build_network(config: DictConfig, *, samples: Samples) -> nn.Module:
 
 
 def build_module(
-    config: DictConfig, *, samples: Samples, stream: TrainingStream, folder: Path
-) -> IlluminationModule:
+    config: DictConfig, *, samples: learn.Samples, stream: learn.TrainingStream, folder: Path
+) -> learn.IlluminationModule:
     """Network, loss and optimiser, for these samples. folder: for the guard's report."""
     from ngi import learn
 
@@ -95,12 +82,12 @@ def build_module(
 def build_run(
     config: DictConfig,
     *,
-    folder: RunFolder,
-    tracker: Tracker,
-    interruption: Interruption,
-    budget: Budget,
+    folder: learn.RunFolder,
+    tracker: learn.Tracker,
+    interruption: learn.Interruption,
+    budget: learn.Budget,
     renderer: Renderer,
-) -> Run:
+) -> learn.Run:
     """All that takes part in a run. ValueError where its parts do not fit each other."""
     from ngi import learn
 
@@ -126,7 +113,7 @@ def build_run(
     )
 
 
-def build_recorder(config: DictConfig, run: Run) -> Recorder:
+def build_recorder(config: DictConfig, run: learn.Run) -> learn.Recorder:
     """What evaluates the run and writes down what is found."""
     from ngi import learn
 
@@ -144,7 +131,7 @@ def build_recorder(config: DictConfig, run: Run) -> Recorder:
     return learn.Recorder(run, evaluator=evaluator, target_map=target_map, label=label)
 
 
-def run_components(config: DictConfig, *, renderer: Renderer) -> list[Component]:
+def run_components(config: DictConfig, *, renderer: Renderer) -> list[learn.Component]:
     """What the steps of this run spend time on, see `ngi.clock.costs`.
 
     Nothing, where path tracing takes the network's place.
@@ -157,7 +144,9 @@ def run_components(config: DictConfig, *, renderer: Renderer) -> list[Component]
     return learn.components(plain(config), renderer=renderer, scored=scored)
 
 
-def run_costs(config: DictConfig, *, budget: Budget, renderer: Renderer) -> Costs | None:
+def run_costs(
+    config: DictConfig, *, budget: learn.Budget, renderer: Renderer
+) -> learn.Costs | None:
     """What the model clock counts with; None for the wall clock.
 
     Raises ValueError for costs that nobody has measured yet, and where batches depend on speed.

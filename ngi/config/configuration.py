@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,6 +36,19 @@ NOT_IDENTITY = (
 )
 """Parts of the configuration that do not decide what a run computes: names, places, helpers."""
 
+RESOLVERS: dict[str, Callable[..., Any]] = {
+    "run_name": run_name,
+    "run_group": run_group,
+    "fast_precision": fast_precision,
+    "network_width": network_width,
+    "network_depth": network_depth,
+    "bootstrap_batches": bootstrap_batches,
+    "folder_name": lambda path: Path(path).name,
+    "absolute_path": lambda *parts: str(Path(*parts).absolute()),
+    "cache_folder": lambda: str(cache_folder()),
+}
+"""What conf/ asks for by ${name:…}."""
+
 
 def register() -> None:
     """Makes scene folders options of the group `scene`, and the resolvers known to OmegaConf."""
@@ -43,17 +57,8 @@ def register() -> None:
     for name, arguments in scenes().items():
         reader = {"_target_": "ngi.scene.read_scene", **arguments}
         store.store(group="scene", name=name, node={"name": name, "reader": reader})
-    OmegaConf.register_new_resolver("run_name", run_name, replace=True)
-    OmegaConf.register_new_resolver("run_group", run_group, replace=True)
-    OmegaConf.register_new_resolver("fast_precision", fast_precision, replace=True)
-    OmegaConf.register_new_resolver("network_width", network_width, replace=True)
-    OmegaConf.register_new_resolver("network_depth", network_depth, replace=True)
-    OmegaConf.register_new_resolver("bootstrap_batches", bootstrap_batches, replace=True)
-    OmegaConf.register_new_resolver("folder_name", lambda path: Path(path).name, replace=True)
-    OmegaConf.register_new_resolver(
-        "absolute_path", lambda *parts: str(Path(*parts).absolute()), replace=True
-    )
-    OmegaConf.register_new_resolver("cache_folder", lambda: str(cache_folder()), replace=True)
+    for name, resolver in RESOLVERS.items():
+        OmegaConf.register_new_resolver(name, resolver, replace=True)
 
 
 def composed(*overrides: str) -> DictConfig:

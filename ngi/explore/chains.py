@@ -30,6 +30,20 @@ class ChainState:
     patch: Tensor
     age: Tensor
 
+    @classmethod
+    def empty(cls, chains: int, state_dimensions: int, **more: Tensor) -> Self:
+        """That of chains which hold no state yet. more: fields of a derived class"""
+        if state_dimensions < 2:
+            raise ValueError(
+                f"state_dimensions: {state_dimensions}: give at least 2, for the patch position"
+            )
+        return cls(
+            position=torch.zeros(chains, state_dimensions),
+            patch=torch.full((chains,), -1),
+            age=torch.zeros(chains, dtype=torch.int64),
+            **more,
+        )
+
     @property
     def occupied(self) -> Tensor:
         """[n] bool, whether the chain holds a state."""
@@ -123,15 +137,7 @@ class MarkovChains:
 
         state_dimensions: S = D + 2; raises ValueError below 2.
         """
-        if state_dimensions < 2:
-            raise ValueError(
-                f"state_dimensions: {state_dimensions}: give at least 2, for the patch position"
-            )
-        return ChainState(
-            position=torch.zeros(self.chains, state_dimensions),
-            patch=torch.full((self.chains,), -1),
-            age=torch.zeros(self.chains, dtype=torch.int64),
-        )
+        return ChainState.empty(self.chains, state_dimensions)
 
     def propose(self, state: ChainState, generator: torch.Generator, *, batch: int) -> Proposals:
         """One proposal per chain; one that holds no state makes a large step (paper, Sec. 5).

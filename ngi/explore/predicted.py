@@ -75,17 +75,8 @@ class PredictedLoss:
 
     def init(self, state_dimensions: int) -> PredictedState:
         """See `MarkovChains.init`: nothing seen yet."""
-        if state_dimensions < 2:
-            raise ValueError(
-                f"state_dimensions: {state_dimensions}: give at least 2, for the patch position"
-            )
-        return PredictedState(
-            position=torch.zeros(self.chains, state_dimensions),
-            patch=torch.full((self.chains,), -1),
-            age=torch.zeros(self.chains, dtype=torch.int64),
-            seen=torch.zeros(0, state_dimensions),
-            loss=torch.zeros(0),
-        )
+        seen = torch.zeros(0, max(state_dimensions, 0))
+        return PredictedState.empty(self.chains, state_dimensions, seen=seen, loss=torch.zeros(0))
 
     def propose(
         self, state: PredictedState, generator: torch.Generator, *, batch: int
