@@ -166,7 +166,3 @@ def doctor(_: DoctorOptions) -> int:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point of `ngi doctor`."""
     return run_tool(doctor, DoctorOptions, "ngi doctor", arguments)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -78,7 +78,3 @@ def check(options: MetricsOptions) -> int:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point of `ngi metrics`; the exit status, see `check` and `run_tool`."""
     return run_tool(check, MetricsOptions, "ngi metrics", arguments)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

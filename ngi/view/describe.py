@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -134,7 +133,3 @@ def describe(options: DescribeOptions) -> int:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point of `ngi describe`."""
     return run_tool(describe, DescribeOptions, "ngi describe", arguments)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

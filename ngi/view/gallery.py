@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -105,7 +104,3 @@ def _grid(tiles: list[tuple[str, Image.Image]], size: int) -> Image.Image:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point of `ngi gallery`."""
     return run_tool(write_sheets, GalleryOptions, "ngi gallery", arguments)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Sequence
 from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass
@@ -171,7 +170,3 @@ def _table(film: Film, measured: Measured) -> str:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point of `ngi video`."""
     return run_tool(write_video, VideoOptions, "ngi video", arguments)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -50,5 +50,5 @@ def test_exr_files_are_written_and_read(tmp_path: Path) -> None:
     sky, file = tmp_path / "sky.exr", tmp_path / "plain.xml"
     assert "[24, 40]" in _on_one_core("-c", WRITES_AND_READS, str(sky))
     file.write_text(SCENE)
-    described = _on_one_core("-m", "ngi.view.describe", str(file), "backend=scalar")
+    described = _on_one_core("-m", "ngi", "describe", str(file), "backend=scalar")
     assert "sky" in described
