@@ -29,15 +29,14 @@ def code_version() -> dict[str, Any]:
 def code_versions(folder: Path) -> list[dict[str, Any]]:
     """Of a run, in order: `code_version`, and 'after_step' from which on it was made with it.
 
-    Empty for runs of before this was recorded; those of before it had them lack 'code'. Raises
-    ValueError where the file is damaged.
+    Empty where nothing was made yet. Raises ValueError where the file is damaged.
     """
     path = folder / FILE
     if not path.exists():
         return []
     try:
         found: list[dict[str, Any]] = json.loads(path.read_text())
-        _ = [(entry["commit"], entry["dirty"], entry["after_step"]) for entry in found]
+        _ = [[entry[key] for key in ("commit", "dirty", "code", "after_step")] for entry in found]
     except (ValueError, KeyError, TypeError) as error:
         raise ValueError(f"{path} is damaged ({error}); delete it, and the run goes on") from error
     return found
@@ -67,13 +66,11 @@ def record_code_version(folder: Path, *, after_step: int) -> None:
 
 def same_program(earlier: dict[str, Any], now: dict[str, Any]) -> bool:
     """Whether two versions compute the same, as far as is known."""
-    if "code" in earlier:
-        return bool(earlier["code"] == now["code"])
-    return bool(earlier["commit"] == now["commit"]) and not (earlier["dirty"] or now["dirty"])
+    return bool(earlier["code"] == now["code"])
 
 
 def shown(version: dict[str, Any]) -> str:
     """'commit 0123456789ab and uncommitted changes (0123abcd)'."""
-    code = f" ({version['code'][:8]})" if "code" in version else ""
+    code = f" ({version['code'][:8]})"
     commit = f"commit {version['commit'][:12]}" if version["commit"] else f"code outside git{code}"
     return f"{commit} and uncommitted changes{code}" if version["dirty"] else commit

@@ -90,7 +90,7 @@ class ProposalsAhead:
     def from_state_dict(cls, state: dict[str, Any]) -> Self:
         """The same proposals, not started."""
         return cls(
-            Proposals(state["position"], state["large_step"], state.get("weight")),
+            Proposals(state["position"], state["large_step"], state["weight"]),
             resolution=state["resolution"],
             seed=state["seed"],
         )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from typing import Any
 
 from ngi.files import code_versions
 from ngi.files.code_versions import same_program, shown
@@ -24,10 +23,11 @@ def heed_code_change(folder: RunFolder, *, on_change: str) -> None:
     """
     if on_change not in ON_CHANGE:
         raise ValueError(f"run.on_code_change: '{on_change}'; expected one of {list(ON_CHANGE)}")
-    earlier, now = _last_version(folder), code_versions.code_version()
-    if earlier is None or same_program(earlier, now):
+    versions = code_versions.code_versions(folder.path) if folder.has_something else []
+    now = code_versions.code_version()
+    if not versions or same_program(versions[-1], now):
         return
-    change = f"{folder.path} was made with {shown(earlier)}, and this is {shown(now)}"
+    change = f"{folder.path} was made with {shown(versions[-1])}, and this is {shown(now)}"
     if on_change == "refuse":
         raise RuntimeError(
             f"{change}; run.on_code_change=continue keeps what is there, run.on_code_change="
@@ -38,13 +38,3 @@ def heed_code_change(folder: RunFolder, *, on_change: str) -> None:
         folder.restarted = True
     elif folder.result is not None:
         log.warning("%s: run.on_code_change=restart makes it again", change)
-
-
-def _last_version(folder: RunFolder) -> dict[str, Any] | None:
-    """None where nothing has been made yet; before there was a record, results named a commit."""
-    if not folder.has_something:
-        return None
-    if found := code_versions.code_versions(folder.path):
-        return found[-1]
-    result = folder.result or {}
-    return {key: result[key] for key in ("commit", "dirty")} if "commit" in result else None

@@ -236,7 +236,7 @@ class PatchStore:
         self._slots = dict(sorted(slots.items()))
         self._ids[: len(ids)] = state["ids"]
         self._losses[: len(ids)] = state["losses"]
-        weights = state.get("weights")  # checkpoints from before there were any have none
+        weights = state["weights"]
         self._weighted = weights is not None
         self._weights[: len(ids)] = 1.0 if weights is None else weights
         self._waiting = state["waiting"]

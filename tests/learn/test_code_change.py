@@ -1,6 +1,5 @@
 """A run whose program has changed goes on with a warning, is refused, or begins afresh."""
 
-import json
 import logging
 import shutil
 from functools import partial
@@ -119,15 +118,6 @@ def test_an_interrupted_run_goes_on_with_a_warning(copy: Path, caplog) -> None:
 def test_another_word_is_refused() -> None:
     with pytest.raises(ValueError, match=r"run\.on_code_change: 'maybe'; expected one of"):
         heed_code_change(SimpleNamespace(), on_change="maybe")  # type: ignore[arg-type]
-
-
-def test_a_result_of_before_there_was_a_record_names_its_commit(copy: Path, caplog) -> None:
-    (copy / "run" / "commits.json").unlink()
-    file = copy / "run" / "result.json"
-    result = json.loads(file.read_text())
-    file.write_text(json.dumps({**result, "commit": "c" * 40, "dirty": False}))
-    train(trained(copy, "continue"))
-    assert "was made with commit cccccccccccc, and this is commit bbb" in caplog.text
 
 
 def test_path_traced_runs_heed_it_too(tmp_path: Path, caplog, program) -> None:
