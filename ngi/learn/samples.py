@@ -113,9 +113,10 @@ class PatchSamples(Samples):
             )
         self.dimensions = renderer.dimensions
         self.patch_size = renderer.patch_size
+        everything = list(range(self.dimensions))
         left_out = slice(0, 0) if camera else renderer.camera_part
         self._seen = slice(0, left_out.start), slice(left_out.stop, self.dimensions)
-        self.components = [i for i in range(self.dimensions) if i not in _indices(left_out)]
+        self.components = [i for i in everything if i not in everything[left_out]]
         self.network_arguments = {
             "layout": self.layout,
             "scene_dimensions": len(self.components),
@@ -163,7 +164,3 @@ def network_of(samples: Samples, make: Callable[..., nn.Module]) -> nn.Module:
 def patch_example(patches: Patches) -> Example:
     """All that the paper's network is given of patches: buffers [n, P, P, C] and v [n, D]."""
     return (patches.buffers, patches.scene_vector), patches.log_radiance
-
-
-def _indices(part: slice) -> range:
-    return range(part.start, part.stop)

@@ -43,34 +43,26 @@ print(*(number.value for number in version))
 
 @dataclass(frozen=True)
 class LlvmLibrary:
-    """A libLLVM that Dr.Jit can use."""
+    """One libLLVM found on this machine. problem: why Dr.Jit cannot use it; None where it can"""
 
     path: str
-    version: tuple[int, int, int]
+    problem: str | None
+    version: tuple[int, ...] = ()
 
     def __str__(self) -> str:
         return f"LLVM {'.'.join(map(str, self.version))} ({self.path})"
 
 
-@dataclass(frozen=True)
-class LlvmCandidate:
-    """One libLLVM found on this machine: the library where it is usable, else its problem."""
-
-    path: str
-    library: LlvmLibrary | None
-    problem: str | None
-
-
 def find_llvm() -> LlvmLibrary | None:
     """The library to use: $DRJIT_LIBLLVM_PATH where that is usable, else the newest usable one."""
-    usable = [c.library for c in llvm_candidates() if c.library is not None]
+    usable = [library for library in llvm_candidates() if library.problem is None]
     asked_for = os.environ.get("DRJIT_LIBLLVM_PATH")
     if asked_for and usable and usable[0].path == asked_for:
         return usable[0]
     return max(usable, key=lambda library: library.version, default=None)
 
 
-def llvm_candidates() -> list[LlvmCandidate]:
+def llvm_candidates() -> list[LlvmLibrary]:
     """Every libLLVM found, $DRJIT_LIBLLVM_PATH first; several names of one file count once."""
     found: dict[str, str] = {}
     for path in _candidate_paths():
@@ -92,7 +84,7 @@ def _candidate_paths() -> list[str]:
 
 
 @cache
-def _examine(path: str) -> LlvmCandidate:
+def _examine(path: str) -> LlvmLibrary:
     """Asks a library for its version in a child process (0.1 s), once per process."""
     try:
         child = subprocess.run(
@@ -103,15 +95,14 @@ def _examine(path: str) -> LlvmCandidate:
             check=False,
         )
     except (OSError, subprocess.TimeoutExpired) as error:
-        return LlvmCandidate(path, None, f"its version could not be asked: {error}")
+        return LlvmLibrary(path, f"its version could not be asked: {error}")
     if child.returncode != 0:
-        return LlvmCandidate(path, None, _problem(child))
-    major, minor, patch = map(int, child.stdout.split())
-    if major < OLDEST_VERSION:
-        return LlvmCandidate(
-            path, None, f"version {major}.{minor}.{patch}, Dr.Jit needs {OLDEST_VERSION} or newer"
-        )
-    return LlvmCandidate(path, LlvmLibrary(path, (major, minor, patch)), None)
+        return LlvmLibrary(path, _problem(child))
+    version = tuple(map(int, child.stdout.split()))
+    if version[0] < OLDEST_VERSION:
+        number = ".".join(map(str, version))
+        return LlvmLibrary(path, f"version {number}, Dr.Jit needs {OLDEST_VERSION} or newer")
+    return LlvmLibrary(path, None, version)
 
 
 def _problem(child: subprocess.CompletedProcess[str]) -> str:

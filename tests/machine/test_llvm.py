@@ -48,7 +48,7 @@ def test_every_candidate_has_a_verdict() -> None:
     assert "version 16.0.6" in verdicts["16.so"].problem
     assert "invalid ELF header" in verdicts["20.so"].problem
     assert verdicts["17.so"].problem is None
-    assert verdicts["17.so"].library.version == (17, 0, 6)
+    assert verdicts["17.so"].version == (17, 0, 6)
 
 
 def test_environment_wins_where_usable(libraries, monkeypatch) -> None:
