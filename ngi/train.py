@@ -14,9 +14,8 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig
 
 from ngi.config.build import build_recorder, build_run, plain, run_costs
-from ngi.config.command_words import completed, with_overrides
 from ngi.config.configuration import register, run_settings, scene_place
-from ngi.config.hydra_program import MESSAGES, fail, run_program
+from ngi.config.hydra_program import MESSAGES, completed, fail, run_program, with_overrides
 from ngi.config.outline import only_bootstrap, outline
 from ngi.config.values import check_values
 from ngi.files.resources import root

@@ -13,7 +13,7 @@ import pytest
 import torch
 
 from ngi.evaluate.lpips_metric import _convolutions
-from ngi.evaluate.reference import read_reference
+from ngi.evaluate.references import read_reference
 from ngi.learn import CostFile
 from ngi.reuse.archive import _read_segment
 

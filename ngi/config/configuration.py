@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,11 +15,33 @@ from omegaconf import DictConfig, OmegaConf
 
 import ngi
 from ngi.config.build import plain
-from ngi.config.names import run_group, run_name
 from ngi.files.resources import cache_folder, root
 from ngi.machine.precision import fast_precision
 from ngi.machine.size import bootstrap_batches, network_depth, network_width
 from ngi.scene import scenes
+
+LONGEST = 100
+"""Characters; longer names are cut, and told apart by a hash."""
+
+
+def run_name(overrides: str | None) -> str:
+    """'sampler=uniform,model.hidden_features=64' as a folder name; 'default' for no override."""
+    name = re.sub(r"[^\w.,=+-]+", "_", (overrides or "").replace("+", "")).strip("_,")
+    if not name:
+        return "default"
+    if len(name) <= LONGEST:
+        return name
+    return f"{name[:LONGEST]}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"
+
+
+def run_group(experiment: str | None, budget: str, clock: str) -> str:
+    """The folder of runs that belong together: the experiment, or else the budget.
+
+    Times of two clocks are not compared: counted ones ('model') have a folder of their own.
+    """
+    group = experiment or budget
+    return group if clock == "wall" else f"{group}-{clock}-clock"
+
 
 if TYPE_CHECKING:
     from ngi.learn import Costs

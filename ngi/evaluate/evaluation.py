@@ -12,11 +12,10 @@ from typing import Any
 from PIL import Image
 from torch import Tensor
 
-from ngi.evaluate.frames import Frame
 from ngi.evaluate.linear import write_linear
 from ngi.evaluate.pictures import Panels, stacked
-from ngi.evaluate.protocol import METRICS, SETS, EvaluationProtocol
-from ngi.evaluate.reference import Reference
+from ngi.evaluate.protocol import METRICS, SETS, EvaluationProtocol, Frame
+from ngi.evaluate.references import Reference
 from ngi.files.durable import full_disk_named
 
 WORST_OF = 20

@@ -14,13 +14,10 @@ from torch import Tensor
 from tqdm import tqdm
 
 from ngi.evaluate.evaluation import EvaluatedFrame, Evaluation, FrameMetrics
-from ngi.evaluate.frames import Frame, evaluation_frames
-from ngi.evaluate.image_metrics import image_metrics
 from ngi.evaluate.lpips_metric import Lpips
-from ngi.evaluate.metrics import non_finite_pixels
-from ngi.evaluate.protocol import EvaluationProtocol
-from ngi.evaluate.reference import Reference
-from ngi.evaluate.references import ReferenceCache
+from ngi.evaluate.metrics import image_metrics, non_finite_pixels
+from ngi.evaluate.protocol import EvaluationProtocol, Frame, evaluation_frames
+from ngi.evaluate.references import Reference, ReferenceCache
 from ngi.render.protocol import Renderer
 
 log = logging.getLogger(__name__)

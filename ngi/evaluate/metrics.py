@@ -6,9 +6,14 @@ are never hidden: they make each of the four metrics NaN or Inf.
 
 from __future__ import annotations
 
+from typing import TypedDict
+
 import torch
 import torch.nn.functional as F
 from torch import Tensor
+
+from ngi.evaluate.lpips_metric import Lpips
+from ngi.evaluate.protocol import EvaluationProtocol
 
 
 def mape(prediction: Tensor, reference: Tensor, epsilon: float) -> float:
@@ -87,3 +92,29 @@ def _check_shapes(prediction: Tensor, reference: Tensor) -> None:
             f"prediction {list(prediction.shape)} and reference {list(reference.shape)}: "
             "both have to be [H, W, 3] of the same size"
         )
+
+
+class ImageMetrics(TypedDict):
+    """MAPE, DSSIM, MAE and LPIPS, which is None where it is not available."""
+
+    mape: float
+    dssim: float
+    mae: float
+    lpips: float | None
+
+
+def image_metrics(
+    prediction: Tensor, reference: Tensor, *, protocol: EvaluationProtocol, lpips: Lpips | None
+) -> ImageMetrics:
+    """prediction, reference: [H, W, 3] linear radiance, at least as large as SSIM's window.
+
+    lpips: None where its time is not worth it
+    """
+    picture = tone_map(prediction, protocol.exposure)
+    wanted = tone_map(reference, protocol.exposure)
+    return ImageMetrics(
+        mape=mape(prediction, reference, protocol.epsilon),
+        dssim=dssim(picture, wanted, window=protocol.ssim_window, sigma=protocol.ssim_sigma),
+        mae=mae(prediction, reference),
+        lpips=lpips(picture, wanted) if lpips is not None and lpips.available else None,
+    )

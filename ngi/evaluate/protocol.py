@@ -6,6 +6,11 @@ import hashlib
 import json
 from dataclasses import asdict, dataclass
 
+from torch import Tensor
+from torch.quasirandom import SobolEngine
+
+from ngi.render.protocol import Renderer
+
 SETS = ("hard", "uniform")
 """The two sets of test frames: the scene's hard frames, and v spread evenly over [0, 1]^D."""
 
@@ -87,3 +92,39 @@ class EvaluationProtocol:
             "samples_per_pass": self.samples_per_pass,
             "maximum_samples": self.maximum_samples,
         }
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One test image.
+
+    set: "hard" or "uniform"
+    index: its number within the set, from 0
+    scene_vector: [D] float32, v in [0, 1]^D
+    """
+
+    set: str
+    index: int
+    scene_vector: Tensor
+
+
+def evaluation_frames(renderer: Renderer, protocol: EvaluationProtocol) -> tuple[Frame, ...]:
+    """The scene's hard frames (paper, Sec. 7.2.1), then the low-discrepancy set.
+
+    The latter are the first points of a scrambled Sobol sequence over [0, 1]^D: they stand for the
+    mean over all configurations, which the hard frames of a path do not.
+    Raises ValueError for hard frames whose length is not the scene's D.
+    """
+    hard = renderer.hard_frames()
+    if hard.ndim != 2 or hard.shape[1] != renderer.dimensions:
+        raise ValueError(
+            f"hard frames of shape {list(hard.shape)}: the scene has {renderer.dimensions} "
+            f"variables, so [n, {renderer.dimensions}] is expected"
+        )
+    engine = SobolEngine(renderer.dimensions, scramble=True, seed=protocol.sobol_seed)
+    uniform = engine.draw(protocol.low_discrepancy_frames)
+    return tuple(
+        Frame(set=name, index=index, scene_vector=v.detach().cpu().float())
+        for name, vectors in (("hard", hard), ("uniform", uniform))
+        for index, v in enumerate(vectors)
+    )

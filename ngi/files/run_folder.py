@@ -14,8 +14,7 @@ from typing import Any, TextIO
 
 from ngi.files import code_versions
 from ngi.files.durable import write_atomically
-from ngi.files.record_log import RecordLog
-from ngi.files.records import CHAINS, TARGET_MAPS
+from ngi.files.record_log import CHAINS, TARGET_MAPS, RecordLog
 from ngi.files.row_log import RowLog
 
 TRACKED = "tracker.json"

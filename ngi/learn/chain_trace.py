@@ -6,7 +6,7 @@ import numpy as np
 from torch import Tensor
 
 from ngi.explore import ChainInfo, Proposals
-from ngi.files.records import MOST_VARIABLES
+from ngi.files.record_log import MOST_VARIABLES
 
 
 def chain_record(
@@ -16,7 +16,7 @@ def chain_record(
     target_proposed: Tensor | None,
     target_current: Tensor | None,
 ) -> dict[str, np.ndarray]:
-    """One step of n chains, as `ngi.files.records.CHAINS` says.
+    """One step of n chains, as `ngi.files.record_log.CHAINS` says.
 
     `RunFolder.chains` keeps it, with the step.
 

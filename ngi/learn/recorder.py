@@ -7,8 +7,8 @@ from typing import Any
 from ngi.evaluate import Evaluation, Evaluator
 from ngi.learn.run import Run
 from ngi.learn.target_map import TargetMap
+from ngi.machine.memory import usage
 from ngi.machine.provenance import provenance
-from ngi.machine.usage import usage
 
 
 class Recorder:

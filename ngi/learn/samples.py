@@ -11,7 +11,7 @@ import torch
 from torch import Tensor, nn
 
 from ngi.denoise import Denoiser, denoised
-from ngi.learn.halves import mean_of_halves
+from ngi.learn.noise import mean_of_halves
 from ngi.patches import BufferLayout, Patches
 from ngi.render.protocol import Deferred, PatchJob, Renderer
 from ngi.render.tracing import derive_seed

@@ -75,7 +75,7 @@ class TargetMap:
     def measure(self) -> dict[str, np.ndarray]:
         """`state`, and `loss` and `target` under the present weights.
 
-        See `ngi.files.records.TARGET_MAPS`.
+        See `ngi.files.record_log.TARGET_MAPS`.
         """
         self.prepare()
         signals = [self._signals(patches.expand(), self._target) for patches in self._patches]

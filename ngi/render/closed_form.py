@@ -11,8 +11,7 @@ from torch import Tensor
 
 from ngi.patches import BufferLayout, MovingPoints
 from ngi.render.protocol import RenderedPatches, Renderer
-from ngi.render.render_inputs import check_states, patch_window, require_positive
-from ngi.render.tracing import derive_seed
+from ngi.render.tracing import check_states, derive_seed, patch_window, require_positive
 
 GOLDEN_RATIO = (1 + sqrt(5)) / 2
 

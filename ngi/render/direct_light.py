@@ -16,6 +16,15 @@ from torch.quasirandom import SobolEngine
 
 from ngi.machine.backend import dr, mi
 
+
+def emission(scene: mi.Scene, hit: mi.SurfaceInteraction3f) -> mi.Color3f:
+    """Linear radiance emitted back along the ray, the environment's where the ray misses."""
+    emitter = hit.emitter(scene)
+    if emitter is None:  # in a scalar variant
+        return mi.Color3f(0)
+    return mi.Color3f(emitter.eval(hit))
+
+
 _SOBOL_DIMENSIONS = (1, 2, 3, 4, 5)
 _LEAST_DENSITY = 1e-30
 """What is divided by where a density is 0, so that nothing becomes NaN."""

@@ -9,8 +9,7 @@ import numpy as np
 
 from ngi.machine.backend import dr, mi
 from ngi.patches import BufferLayout
-from ngi.render.direct_light import direct_light
-from ngi.render.emission import emission
+from ngi.render.direct_light import direct_light, emission
 from ngi.render.materials import Material, collect_materials, evaluate_materials
 from ngi.render.needs import buffer_needs, direct_need, needed_layout
 from ngi.render.specular import SpecularChain, specular_chain

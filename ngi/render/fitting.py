@@ -1,7 +1,7 @@
 """Launches that do not fit into memory are traced in parts.
 
 On CUDA Dr.Jit raises a RuntimeError where it gets no memory. On LLVM Dr.Jit 1.5 does not: it ends
-the process, or Linux does. There `ngi.render.launches` keeps launches small beforehand, and only
+the process, or Linux does. There `ngi.render.tracing` keeps launches small beforehand, and only
 what workers render is rendered again.
 """
 

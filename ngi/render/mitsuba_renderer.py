@@ -14,13 +14,21 @@ from ngi.machine.backend import activate, describe, mi
 from ngi.render.first_hit import FirstHit, first_hit_of
 from ngi.render.fitting import FittingTracer
 from ngi.render.jit_tracer import JitTracer, free_memory
-from ngi.render.launches import SAMPLES_PER_PASS, bands, passes
 from ngi.render.needs import buffers_are_static
 from ngi.render.projection import Projection
 from ngi.render.protocol import RenderedPatches, Renderer
-from ngi.render.render_inputs import check_states, patch_window, require_positive
 from ngi.render.scalar_tracer import ScalarTracer
-from ngi.render.tracing import Pending, Tracer, derive_seed
+from ngi.render.tracing import (
+    SAMPLES_PER_PASS,
+    Pending,
+    Tracer,
+    bands,
+    check_states,
+    derive_seed,
+    passes,
+    patch_window,
+    require_positive,
+)
 from ngi.scene import SceneDescription
 from ngi.scene.kinds import most_materials
 from ngi.scene.moving_points import moving_points

@@ -14,7 +14,7 @@ import numpy as np
 
 from ngi.machine.backend import dr, mi
 from ngi.render.bounces import SpecularSurface, specular_surface
-from ngi.render.emission import emission
+from ngi.render.direct_light import emission
 from ngi.render.materials import Material, collect_materials, has_bsdf
 from ngi.scene.variable_scene import VariableScene
 

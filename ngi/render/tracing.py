@@ -1,4 +1,7 @@
-"""What the renderer needs of a backend: a window of pixels in, averaged samples out."""
+"""What the renderer needs of a backend: a window of pixels in, averaged samples out.
+
+And how many paths it asks for at a time.
+"""
 
 from __future__ import annotations
 
@@ -62,3 +65,63 @@ def derive_seed(*parts: int | bytes) -> int:
         data = part if isinstance(part, bytes) else str(part).encode()
         digest.update(len(data).to_bytes(4, "little") + data)
     return int.from_bytes(digest.digest(), "little")
+
+
+PATHS_PER_LAUNCH = 2**22
+"""Images and patches are traced in launches of about this many paths at most: about 200 MB."""
+
+SAMPLES_PER_PASS = 256
+"""Samples of an image's pixel that are summed in single precision before double takes over."""
+
+
+def bands(resolution: int, samples: int) -> list[Window]:
+    """The rows of a square image, as many at a time as `PATHS_PER_LAUNCH` allows."""
+    rows = min(resolution, max(1, PATHS_PER_LAUNCH // (resolution * samples)))
+    return [
+        Window(0, y, resolution, min(rows, resolution - y), resolution)
+        for y in range(0, resolution, rows)
+    ]
+
+
+def passes(samples: int, pixels: int) -> list[int]:
+    """Samples per pixel of each launch: as few launches as `PATHS_PER_LAUNCH` allows, alike."""
+    count = -(-samples * pixels // PATHS_PER_LAUNCH)
+    return [samples // count + (i < samples % count) for i in range(count)]
+
+
+def require_positive(**numbers: int) -> None:
+    """ValueError, naming it, for a number below 1."""
+    for name, number in numbers.items():
+        if number < 1:
+            raise ValueError(f"renderer: {name} is {number}; expected a positive integer")
+
+
+def check_states(states: Tensor, dimensions: int) -> None:
+    """ValueError for states that are not [n, D + 2] numbers in [0, 1]."""
+    if states.ndim != 2 or states.shape[1] != dimensions + 2:
+        raise ValueError(
+            f"states of shape {list(states.shape)}: expected [n, {dimensions + 2}], "
+            f"{dimensions} scene variables and the patch position"
+        )
+    inside = (states >= 0) & (states <= 1)  # NaN is outside too
+    if not bool(inside.all()):
+        row, column = (~inside).nonzero()[0].tolist()
+        raise ValueError(
+            f"states[{row}, {column}] is {float(states[row, column])}; expected 0 to 1"
+        )
+
+
+def patch_window(position: Tensor, *, patch_size: int, resolution: int) -> Window:
+    """The patch of P x P pixels at a position (x, y) in [0, 1]^2 of a square virtual image.
+
+    Its first column is floor(x * (resolution - P + 1)), clamped to the last one; rows alike.
+    Raises ValueError for a patch larger than the image.
+    """
+    if patch_size > resolution:
+        raise ValueError(
+            f"a patch of {patch_size} pixels is larger than the image of {resolution}; choose a "
+            "resolution of at least patch_size"
+        )
+    last = resolution - patch_size
+    x, y = (min(int(p * (last + 1)), last) for p in position.tolist())
+    return Window(x, y, patch_size, patch_size, resolution)

@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from ngi.render.protocol import Deferred, RenderedPatches, Renderer
-from ngi.render.render_inputs import check_states, patch_window
+from ngi.render.tracing import check_states, patch_window
 from ngi.render.worker_pool import WorkerPool
 from ngi.render.worker_process import WorkerProcess
 from ngi.render.worker_protocol import Request, Worker

@@ -10,7 +10,7 @@ import numpy as np
 
 from ngi.machine.backend import mi
 from ngi.scene import srgb
-from ngi.scene.complaints import without_place
+from ngi.scene.loading import without_place
 from ngi.scene.parameters import Parameters
 from ngi.scene.scene_files import SceneFile
 from ngi.scene.variable import Values

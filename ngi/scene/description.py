@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.stats import qmc
 
 from ngi.scene.kinds import CameraPath, FieldOfView, LookAt, Material
 from ngi.scene.scene_files import SceneFile
@@ -146,3 +147,12 @@ def component_names(variables: tuple[Variable, ...]) -> tuple[str, ...]:
         for stem, variable in zip(stems, variables, strict=True)
         for component in variable.components
     )
+
+
+HARD_FRAMES, PATH_FRAMES = 10, 6
+
+
+def spread_frames(count: int, dimensions: int) -> tuple[Vector, ...]:
+    """Points of v spread evenly over the hypercube: a Halton sequence, always the same."""
+    points = qmc.Halton(dimensions, seed=2022).random(count)
+    return tuple(tuple(point) for point in points.round(4).tolist())

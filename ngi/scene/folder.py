@@ -11,20 +11,24 @@ from pathlib import Path
 from typing import Any
 
 from ngi.files.resources import scene_folders
-from ngi.scene.description import SceneDescription, component_names
-from ngi.scene.frames import HARD_FRAMES, PATH_FRAMES, spread_frames
+from ngi.scene.description import (
+    HARD_FRAMES,
+    PATH_FRAMES,
+    SceneDescription,
+    component_names,
+    spread_frames,
+)
 from ngi.scene.kinds import KINDS
 from ngi.scene.offered import advice
-from ngi.scene.permission import allowed_file
 from ngi.scene.scene_files import (
+    allowed_file,
     content_hash,
     integrator_max_depth,
     named_files,
     read_scene_file,
 )
 from ngi.scene.variable import Variable
-from ngi.scene.yaml_keys import Vector, YamlKeys
-from ngi.scene.yaml_loader import load_yaml
+from ngi.scene.yaml_keys import Vector, YamlKeys, load_yaml
 
 _SAME_THING = {"camera_path": "look_at", "texels": "texture"}
 """Kinds that set what another kind sets."""

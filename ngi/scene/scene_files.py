@@ -1,4 +1,4 @@
-"""What can be known of a Mitsuba scene file without Mitsuba: the files it names, and its hash."""
+"""What is known of a Mitsuba scene file without Mitsuba: what it names and may read, its hash."""
 
 from __future__ import annotations
 
@@ -10,8 +10,41 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from xml.etree import ElementTree
 
-from ngi.scene.permission import allowed_file
 from ngi.scene.xml_file import Lines, read_xml
+
+ASSETS = "NGI_ASSETS"
+"""Environment variable: further folders that scenes may read from, as in PATH."""
+
+
+def allowed_file(folder: Path, name: str, *, within: Path, where: str) -> Path:
+    """The file that a scene names, counted from `folder`.
+
+    within: the scene's folder, which it has to lie in once symlinks are followed, or else in one
+        of those in $NGI_ASSETS. where: the file and the key that name it, for the message.
+
+    Raises ValueError for a file elsewhere, and FileNotFoundError where there is no regular file.
+    """
+    path = folder / name
+    try:
+        real, exists = path.resolve(), path.is_file()
+    except (OSError, ValueError, RuntimeError) as error:  # NUL, too long, symlinks in a circle
+        raise ValueError(f"{where} names {name[:80]!r}, which is no file: {error}") from None
+    if not any(real.is_relative_to(place) for place in (within.resolve(), *_assets())):
+        raise ValueError(
+            f"{where} names '{name}', which is {real}, outside of the scene's folder {within}; "
+            f"bring it there, or allow it where you trust the scene: {ASSETS}={real.parent}"
+        )
+    if not exists:
+        raise FileNotFoundError(
+            f"{where} names '{name}', which is not there; bring the file to {path} or correct the "
+            "name"
+        )
+    return path
+
+
+def _assets() -> list[Path]:
+    return [Path(part).resolve() for part in os.environ.get(ASSETS, "").split(os.pathsep) if part]
+
 
 NamedFile = tuple[str, Path]
 
@@ -44,7 +77,7 @@ class SceneFile:
 def read_scene_file(path: Path, *, within: Path | None = None) -> SceneFile:
     """A Mitsuba XML file and those that it includes.
 
-    within: the folder whose files it may name, see `ngi.scene.permission`; its own where None.
+    within: the folder whose files it may name, see `ngi.scene.scene_files`; its own where None.
 
     Raises FileNotFoundError for a file that is not there, and ValueError for broken XML and for
     files that it must not read, both with what to do.

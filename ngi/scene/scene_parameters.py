@@ -7,9 +7,16 @@ from pathlib import Path
 
 from ngi.machine.backend import mi
 from ngi.scene.assets import Bitmap, load_vertices
-from ngi.scene.bodies import Emission, Positioned, Transformed, Vertices
 from ngi.scene.parameters import Parameters
-from ngi.scene.placement import Body, Placement, parking
+from ngi.scene.placement import (
+    Body,
+    Emission,
+    Placement,
+    Positioned,
+    Transformed,
+    Vertices,
+    parking,
+)
 from ngi.scene.scene_files import SceneFile
 from ngi.scene.variable import Values, Write
 

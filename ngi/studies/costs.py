@@ -18,9 +18,8 @@ from omegaconf import DictConfig, OmegaConf, open_dict
 from tabulate import tabulate
 
 from ngi.config.build import build_module, build_samples, build_stream, plain, run_components
-from ngi.config.command_words import completed, with_overrides
 from ngi.config.configuration import register
-from ngi.config.hydra_program import MESSAGES, fail, run_program
+from ngi.config.hydra_program import MESSAGES, completed, fail, run_program, with_overrides
 from ngi.config.values import check_values
 from ngi.files.resources import cache_folder, root
 from ngi.machine.memory import keep_freed_memory

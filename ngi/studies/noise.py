@@ -18,9 +18,8 @@ from omegaconf import DictConfig, open_dict
 from tabulate import tabulate
 
 from ngi.config.build import build_network, build_samples
-from ngi.config.command_words import completed, with_overrides
 from ngi.config.configuration import register
-from ngi.config.hydra_program import MESSAGES, fail, run_program
+from ngi.config.hydra_program import MESSAGES, completed, fail, run_program, with_overrides
 from ngi.config.values import check_values
 from ngi.files.resources import root
 from ngi.studies.costs import in_this_process

@@ -9,9 +9,8 @@ from pathlib import Path
 from ngi.config.options import option, run_tool
 from ngi.machine.backend import activate
 from ngi.scene.arrangement import STATIC
-from ngi.scene.clearance import camera_problems
+from ngi.scene.clearance import camera_problems, meeting_views, out_of_bounds
 from ngi.scene.description import SceneDescription
-from ngi.scene.extent import meeting_views, out_of_bounds
 from ngi.scene.folder import read_scene, scenes
 from ngi.scene.loading import load
 from ngi.scene.scene_files import named_files, read_scene_file

@@ -49,8 +49,7 @@ def export(options: ExportOptions) -> None:
     if missing := [name for name in PACKAGES if find_spec(name) is None]:
         raise ValueError(f"{', '.join(missing)} missing: pip install -e .[export]")
     from ngi.files.durable import write_atomically
-    from ngi.view.network_file import ImageNetwork, network_file
-    from ngi.view.network_metadata import network_metadata
+    from ngi.view.network_file import ImageNetwork, network_file, network_metadata
     from ngi.view.trained_run import TrainedRun
 
     run = TrainedRun.open(Path(options.run), scene_path=options.scene)
@@ -107,8 +106,7 @@ def _inputs(run: TrainedRun, frame: Tensor, v: Tensor) -> dict[str, tuple[Tensor
 
 def _shown_difference(run: TrainedRun, frame: Tensor, v: Tensor) -> float:
     """How far `ngi render` and the viewer, in the precision of training, are from float32."""
-    from ngi.view.network_file import relative_difference
-    from ngi.view.network_metadata import FLOAT32
+    from ngi.view.network_file import FLOAT32, relative_difference
 
     shown, exact = (
         replace(run, precision=precision).predict(frame, v).expm1()

@@ -1,18 +1,27 @@
-"""A network as the content of an ONNX file, and how far what that gives is from the network."""
+"""A network as the content of an ONNX file, and what a program that embeds it has to know."""
 
 from __future__ import annotations
 
 import copy
+import json
 import logging
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
 
 import onnx
 import onnxruntime
 import torch
 from torch import Tensor, nn
 
+from ngi.learn import PatchSamples
+from ngi.machine.provenance import provenance
 from ngi.models import EncodedGenerator, PixelGenerator
+from ngi.models.known_light import EMITTER_THRESHOLD
+from ngi.patches import BufferLayout
+from ngi.scene import SceneDescription
+from ngi.view.trained_run import TrainedRun
 
 ImageNetwork = PixelGenerator | EncodedGenerator
 """A network that tells radiance from the buffers of a pixel and from v."""
@@ -89,3 +98,124 @@ def _forget_origins(graph: onnx.GraphProto) -> None:
         entry.ClearField("metadata_props")
         entry.ClearField("doc_string")
     graph.ClearField("metadata_props")
+
+
+FLOAT32 = "32-true"
+"""As Lightning names the precision of networks that are shown in float32."""
+BUFFERS = {
+    "position": "world position p of the hit: (p - minimum) / (maximum - minimum) of 'bounds'",
+    "normal": "shading normal n in world space: n / 2 + 1 / 2",
+    "outgoing": "unit vector from the surface towards the camera, world space, in [-1, 1]",
+    "albedo": "linear RGB in [0, 1]: diffuse reflectance or base colour; of a conductor its "
+    "specular_reflectance and not what its metal (eta, k) absorbs, of a dielectric its "
+    "specular_transmittance; 1 where the scene's file gives the material none of these",
+    "roughness": "alpha of GGX or Beckmann; 0 where perfectly smooth, 1 where diffuse",
+    "throughput": "of the specular bounces before the surface, linear RGB; 1 where there is none",
+    "chain_roughness": "sqrt of the sum of alpha^2 over these bounces",
+    "direct": "log(1 + x) of the pixel's mean direct light x, linear RGB: the radiance that leaves "
+    "the surface towards the camera after one bounce from an emitter, times the throughput; "
+    "trained on one emitter sample and one BSDF sample per camera ray, combined by multiple "
+    "importance sampling",
+    "emission": "log(1 + x) of the mean emitted radiance x of the pixel, linear RGB",
+}
+"""What the channels of `BufferLayout` are."""
+
+PIXELS = (
+    "each channel is the mean over the 'buffer_samples' camera rays of a pixel, spread evenly over "
+    "its square; a ray that hits nothing counts as 0, "
+    "but for its throughput and the environment's emission"
+)
+RADIANCE = "linear RGB in the scene's units, as the network gives it: it may be slightly negative"
+KNOWN_LIGHT = {
+    (): "expm1(o)",
+    ("emission",): "expm1(o + emission)",
+    ("direct",): "expm1(o + direct)",
+    ("direct", "emission"): "expm1(o + log1p(expm1(direct) + expm1(emission)))",
+}
+"""The radiance, o being the network's own output in log1p space; by the channels there are."""
+EMITTER = f"expm1(emission) in channels where emission > {EMITTER_THRESHOLD:g}, elsewhere "
+ADDED = "; the file computes this itself, nothing is to be added to its radiance"
+COMPONENTS = (
+    "each variable's components of v follow those of the one before. u in [0, 1] stands for "
+    "minimum + u * (maximum - minimum); a number whose minimum equals its maximum takes no "
+    "component; with 'linked' one u moves all numbers. Of n choices u stands for number "
+    "min(floor(n * u), n - 1). Keys and frames are spread evenly from 0 to 1. v is without what "
+    "'left_out' names: it only places the camera, and where that is the buffers tell."
+)
+
+
+def network_metadata(run: TrainedRun, precision_differs: float) -> dict[str, str]:
+    """By key, structures as JSON. Closed formulas have no bounds and no variables.
+
+    precision_differs: how far what `TrainedRun.radiance` shows is from the network in float32,
+        relative to 1 + radiance
+    """
+    assert isinstance(run.samples, PatchSamples)
+    origin = provenance(backend=run.renderer.description)
+    return {
+        "scene": run.scene_name,
+        "scene_hash": run.renderer.scene_hash,
+        "step": str(run.step),
+        "commit": f"{origin['commit'] or 'unknown'}{' (changed since)' if origin['dirty'] else ''}",
+        "versions": json.dumps(origin["versions"]),
+        "precision": _precision(run.precision, precision_differs),
+        "buffers": json.dumps(list(_buffers(run.renderer.layout))),
+        "pixels": PIXELS,
+        "buffer_samples": str(run.renderer.buffer_samples),
+        **(
+            {}
+            if run.description is None
+            else scene_metadata(run.description, run.samples.components)
+        ),
+        "known_light": known_light(run.renderer.layout),
+        "radiance": RADIANCE,
+    }
+
+
+def scene_metadata(description: SceneDescription, seen: Sequence[int]) -> dict[str, str]:
+    """The box that positions count in, and the variables as scene.yaml has them, in order of v.
+
+    seen: which components of v the network is given
+    """
+    low, high = description.bounds
+    names = description.component_names
+    kept = {names[number] for number in seen}
+    variables = [
+        {
+            "components": [name for name in names[part] if name in kept],
+            "kind": variable.kind,
+            **asdict(variable),
+        }
+        for variable, part in description.parts()
+        if kept.issuperset(names[part])
+    ]
+    return {
+        "bounds": json.dumps({"minimum": low, "maximum": high}),
+        "variables": json.dumps(variables),
+        "left_out": json.dumps([name for name in names if name not in kept]),
+        "v": COMPONENTS,
+    }
+
+
+def known_light(layout: BufferLayout) -> str:
+    """How the light that the buffers tell becomes part of the radiance."""
+    names = tuple(name for name in ("direct", "emission") if name in layout.names)
+    return f"{EMITTER if 'emission' in names else ''}{KNOWN_LIGHT[names]}{ADDED}"
+
+
+def _precision(trained: str, differs: float) -> str:
+    text = f"float32; trained as {trained}"
+    if trained == FLOAT32:
+        return text
+    return (
+        f"{text}, in which the program itself shows the network: its pictures differ from what "
+        f"this file gives by up to {differs:.2g} of 1 + radiance"
+    )
+
+
+def _buffers(layout: BufferLayout) -> Iterable[dict[str, Any]]:
+    """In order of the channels."""
+    for name in layout.names:
+        part = layout.slice(name)
+        channels = part.stop - part.start
+        yield {"name": name, "first": part.start, "channels": channels, "meaning": BUFFERS[name]}

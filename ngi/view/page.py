@@ -1,17 +1,83 @@
-"""The web server whose page shows a network, to any number of browsers."""
+"""The web server whose page shows a network, to any number of browsers and to no other page."""
 
 from __future__ import annotations
 
 import logging
+import re
 import time
 import warnings
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
+from http import HTTPStatus
+from threading import Lock
+from typing import Any
+from urllib.parse import urlsplit
 
 import viser
+from websockets.asyncio import server as websockets_server
+from websockets.asyncio.server import ServerConnection
+from websockets.http11 import Request, Response
 
-from ngi.view.server import fenced, viser_server
 from ngi.view.studio import Studio
 from ngi.view.subject import Subject
 from ngi.view.visitor import Visitor
+
+LOOPBACK = ("127.0.0.1", "localhost", "::1")
+
+Answer = Response | None
+Processor = Callable[[ServerConnection, Request], Answer | Awaitable[Answer]]
+
+_changing = Lock()
+
+
+def viser_server(*, host: str, port: int, label: str | None = None) -> viser.ViserServer:
+    """A server that refuses websockets opened by pages of other origins, with status 403.
+
+    Any page that a browser shows may open a websocket to this machine, and says truly where it is
+    from: that has to be this server, as the browser was told its name (through a tunnel the port
+    may differ). Bound to a loopback address, the name must be one too, so that no foreign name that
+    resolves to it does. Programs that are no browsers give no origin and are let in.
+    """
+    with _checking_origins(host):
+        return viser.ViserServer(host=host, port=port, label=label, verbose=False)
+
+
+def is_own_page(origin: str | None, name: str | None, *, host: str) -> bool:
+    """Whether a request's Origin is the server that its Host names; host: what it is bound to."""
+    if origin is None:
+        return True
+    if name is None or urlsplit(origin).netloc != name:
+        return False
+    return host not in LOOPBACK or urlsplit(f"//{name}").hostname in LOOPBACK
+
+
+def fenced(text: str) -> str:
+    """Markdown that shows any text as it is: its fence is longer than every run of backticks."""
+    longest = max(map(len, re.findall("`+", text)), default=0)
+    fence = "`" * max(3, longest + 1)
+    return f"{fence}\n{text}\n{fence}"
+
+
+@contextmanager
+def _checking_origins(host: str) -> Iterator[None]:
+    """Viser 1.1 has no place for such a check: the function that it serves by gets it meanwhile."""
+    serve = websockets_server.serve
+
+    def checked(*arguments: Any, process_request: Processor, **options: Any) -> Any:
+        def process(connection: ServerConnection, request: Request) -> Answer | Awaitable[Answer]:
+            headers = request.headers
+            if is_own_page(headers.get("Origin"), headers.get("Host"), host=host):
+                return process_request(connection, request)
+            return connection.respond(HTTPStatus.FORBIDDEN, "opened by a page of another origin\n")
+
+        return serve(*arguments, process_request=process, **options)
+
+    with _changing:
+        websockets_server.serve = checked  # type: ignore[assignment, misc]
+        try:
+            yield
+        finally:
+            websockets_server.serve = serve  # type: ignore[misc]
 
 
 class Page:

@@ -11,10 +11,8 @@ from typing import Any
 import viser
 
 from ngi.evaluate.pictures import ERROR_RANGE, error_colours
-from ngi.view.controls import Control
-from ngi.view.inputs import Input, inputs
-from ngi.view.screen import PARTS, Screen
-from ngi.view.tone import CURVES
+from ngi.view.inputs import Control, Input, inputs
+from ngi.view.screen import CURVES, PARTS, Screen
 
 RESOLUTIONS = ("64", "128", "256", "384", "512", "768", "900")
 CHOOSE = "choose …"

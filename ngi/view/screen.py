@@ -1,4 +1,4 @@
-"""What the viewer's picture shows of a configuration, as pixels."""
+"""What the viewer's picture shows of a configuration, as pixels, and through which curve."""
 
 from __future__ import annotations
 
@@ -6,13 +6,35 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from ngi.evaluate import tone_map
 from ngi.evaluate.pictures import eight_bit, error_picture
 from ngi.view.gallery import buffer_picture
 from ngi.view.scene_view import SceneView
-from ngi.view.tone import shown
+
+CURVES = ("sRGB", "filmic", "linear")
+
+
+def shown(radiance: Tensor, *, curve: str, exposure: float) -> Tensor:
+    """[H, W, 3] linear RGB to values in [0, 1] for a screen; NaN where a pixel is not finite.
+
+    curve: 'sRGB', as the metrics see pictures; 'filmic', Narkowicz's fit of the ACES curve before
+    the sRGB one, which keeps highlights; 'linear', clipped and without any.
+    exposure: stops
+    """
+    if curve == "sRGB":
+        return tone_map(radiance, exposure)
+    visible = torch.where(radiance.isfinite(), radiance * 2.0**exposure, torch.nan)
+    if curve == "linear":
+        return visible.clamp(0, 1)
+    if curve == "filmic":
+        x = visible.clamp(min=0)
+        return tone_map((x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14))
+    raise ValueError(f"curve '{curve}': choose one of {', '.join(CURVES)}")
+
 
 Pixels = NDArray[np.uint8]
 
@@ -31,7 +53,7 @@ class Screen:
     """What to show, and how.
 
     show: a key of `PARTS`, or a buffer's name
-    curve, exposure: see `ngi.view.tone.shown`
+    curve, exposure: see `ngi.view.screen.shown`
     epsilon: of the relative error, as in the evaluation protocol
     """
 

@@ -9,10 +9,9 @@ from dataclasses import dataclass
 from time import monotonic
 
 from ngi.render import Renderer
-from ngi.view.pace import Pace
 from ngi.view.scene_view import Place, Predict, SceneView
 from ngi.view.screen import Pixels
-from ngi.view.session import Job, Session, Wish
+from ngi.view.session import Job, Pace, Session, Wish
 
 KEPT = 8
 """Views of other places whose path-traced pictures are kept."""

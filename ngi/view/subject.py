@@ -1,4 +1,4 @@
-"""What a page is about: a scene that a network shows."""
+"""What a page is about: a scene that a network shows, and the camera in it."""
 
 from __future__ import annotations
 
@@ -6,11 +6,62 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
 from ngi.evaluate import EvaluationProtocol
 from ngi.render import Renderer
 from ngi.scene import SceneDescription
-from ngi.view.camera import Camera, camera_of
-from ngi.view.controls import Control, controls, unnamed_controls
+from ngi.scene.kinds import LookAt
+from ngi.view.inputs import Control, controls, unnamed_controls
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Camera:
+    """The scene's camera, moved within the box that v has for it.
+
+    variable: of the scene; part: its components of v
+    """
+
+    variable: LookAt
+    part: slice
+
+    @property
+    def up(self) -> tuple[float, ...]:
+        return self.variable.up
+
+    def view(self, v: ArrayLike) -> tuple[Vector, Vector]:
+        """Origin and target at a v of shape [D], world space."""
+        value = self.variable.value(np.asarray(v, dtype=np.float64)[self.part])
+        return value[:3], value[3:]
+
+    def components(self, origin: ArrayLike, target: ArrayLike) -> Vector:
+        """Those components of v that come closest to a view; origin and target in world space.
+
+        The target counts as a direction only, since a mouse that turns a camera does not say how
+        far away it looks. It is moved in this direction to the middle of its box.
+        """
+        low, high = np.array(self.variable.minimum), np.array(self.variable.maximum)
+        start = np.clip(np.asarray(origin, dtype=np.float64), low[:3], high[:3])
+        direction = np.asarray(target, dtype=np.float64) - np.asarray(origin, dtype=np.float64)
+        middle = (low[3:] + high[3:]) / 2
+        length = direction @ direction
+        along = max((middle - start) @ direction / length, 1e-3) if length > 0 else 0.0
+        end = np.clip(start + along * direction, low[3:], high[3:])
+        varied = low != high
+        value = np.concatenate([start, end])[varied]
+        components: Vector = np.clip((value - low[varied]) / (high - low)[varied], 0, 1)
+        return components
+
+
+def camera_of(description: SceneDescription) -> Camera | None:
+    """None where no variable of the scene lets the camera walk."""
+    for variable, part in description.parts():
+        if isinstance(variable, LookAt) and not variable.linked and part.stop > part.start:
+            return Camera(variable, part)
+    return None
 
 
 @dataclass(frozen=True)

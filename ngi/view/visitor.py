@@ -17,13 +17,12 @@ from PIL import Image
 from ngi.evaluate import image_metrics
 from ngi.evaluate.pictures import WHITE, side_by_side
 from ngi.render.exr import write_exr
-from ngi.view.camera import Vector
 from ngi.view.panel import Panel
 from ngi.view.scene_view import Place
 from ngi.view.screen import Pixels
 from ngi.view.session import Wish
 from ngi.view.studio import Shown, Studio
-from ngi.view.subject import Subject
+from ngi.view.subject import Subject, Vector
 
 SMALL = 128
 """Pixels a side up to which JPEG would not be faster than PNG, and its colours would run."""

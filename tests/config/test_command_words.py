@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from ngi.config.command_words import completed, with_overrides
+from ngi.config.hydra_program import completed, with_overrides
 from tests.learn.command_line import run
 
 

@@ -1,6 +1,6 @@
 import pytest
 
-from ngi.config.names import LONGEST, run_group, run_name
+from ngi.config.configuration import LONGEST, run_group, run_name
 
 
 @pytest.mark.parametrize(

@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 
 from ngi.cli import VERBS
-from ngi.config.command_words import completed
 from ngi.config.configuration import composed
+from ngi.config.hydra_program import completed
 from tests.config.test_configuration import composed as known_to_hydra
 from tests.docs.pages import ROOT, commands
 

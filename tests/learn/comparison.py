@@ -6,7 +6,7 @@ from typing import Any
 import pandas as pd
 import torch
 
-from ngi.machine.usage import COLUMNS
+from ngi.machine.memory import COLUMNS
 
 
 def assert_same(a: Any, b: Any, path: str = "") -> None:

@@ -12,7 +12,7 @@ from omegaconf import DictConfig
 
 from ngi.config.build import run_components
 from ngi.learn import CostFile, TrainingStream
-from ngi.machine.usage import COLUMNS
+from ngi.machine.memory import COLUMNS
 from ngi.render import AnalyticRenderer
 from ngi.studies import costs as costs_command
 from ngi.train import train

@@ -13,7 +13,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from ngi.learn import MLflow, TensorBoard, WeightsAndBiases, aside, lightning_trackers
+from ngi.learn import MLflow, TensorBoard, WeightsAndBiases, lightning_trackers
 from ngi.learn import remote_tracker as remote
 
 LABEL = {
@@ -123,7 +123,7 @@ def test_what_fails_is_said_once(watch, caplog, tmp_path: Path, where, error) ->
 def test_what_hangs_holds_nothing_up(watch, caplog, monkeypatch) -> None:
     monkeypatch.setattr(remote, "FINISH_SECONDS", 0.1)
     monkeypatch.setattr(remote, "LEEWAY_SECONDS", 0.1)
-    monkeypatch.setattr(aside, "CAPACITY", 50)
+    monkeypatch.setattr(remote, "CAPACITY", 50)
     gate = threading.Event()
     wandb, watched = watch(lambda what: gate.wait(60) if what == "log" else None)
     begun = time.monotonic()

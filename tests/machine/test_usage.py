@@ -1,7 +1,7 @@
 from mmap import mmap
 from pathlib import Path
 
-from ngi.machine.usage import COLUMNS, usage
+from ngi.machine.memory import COLUMNS, usage
 
 
 def test_memory_files_and_folder_grow_by_what_is_added(tmp_path: Path) -> None:

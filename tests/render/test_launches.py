@@ -2,7 +2,7 @@
 
 import pytest
 
-from ngi.render.launches import PATHS_PER_LAUNCH, bands, passes
+from ngi.render.tracing import PATHS_PER_LAUNCH, bands, passes
 
 
 @pytest.mark.parametrize("samples", [1, 200, 4096, 4097, 5001, 24_000])

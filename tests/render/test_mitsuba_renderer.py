@@ -130,7 +130,7 @@ def test_image_is_the_mean_of_its_passes(load_box, monkeypatch) -> None:
     whole = renderer.render_image(V, resolution=16, samples_per_pixel=512, seed=0)
     buffers = renderer.image_buffers(V, resolution=16)
     monkeypatch.setattr("ngi.render.mitsuba_renderer.SAMPLES_PER_PASS", 100)
-    monkeypatch.setattr("ngi.render.launches.PATHS_PER_LAUNCH", 100 * 16 * 5)
+    monkeypatch.setattr("ngi.render.tracing.PATHS_PER_LAUNCH", 100 * 16 * 5)
     passes = renderer.render_image(V, resolution=16, samples_per_pixel=512, seed=0)
     assert passes.shape == (16, 16, 3)
     # Away from the lamp, whose edges are the noisiest part of the picture.
@@ -150,7 +150,7 @@ def test_buffers_of_an_image_are_the_same_in_bands(load_box, monkeypatch) -> Non
         "buffers",
         lambda window, samples: (windows.append(window), buffers(window, samples=samples))[1],
     )
-    monkeypatch.setattr("ngi.render.launches.PATHS_PER_LAUNCH", 4 * 16 * 5)
+    monkeypatch.setattr("ngi.render.tracing.PATHS_PER_LAUNCH", 4 * 16 * 5)
     torch.testing.assert_close(renderer.image_buffers(V, resolution=16), whole)
     assert [window.height for window in windows] == [5, 5, 5, 1]
 

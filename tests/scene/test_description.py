@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ngi.scene import read_scene
-from ngi.scene.yaml_loader import load_yaml
+from ngi.scene.yaml_keys import load_yaml
 
 BOX = Path(__file__).parents[1] / "render" / "scenes" / "box"
 SCENES = sorted(p.parent for p in (Path(__file__).parents[2] / "scenes").glob("*/scene.yaml"))

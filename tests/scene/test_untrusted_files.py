@@ -11,9 +11,8 @@ import pytest
 
 from ngi.scene import read_scene
 from ngi.scene.loading import load
-from ngi.scene.permission import ASSETS
 from ngi.scene.release import read_release
-from ngi.scene.scene_files import named_files, read_scene_file
+from ngi.scene.scene_files import ASSETS, named_files, read_scene_file
 from tests.fuzz.seeds import RELEASES, SCENES, XML, write_seed
 
 

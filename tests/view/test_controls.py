@@ -6,8 +6,8 @@ import pytest
 from ngi.scene import SceneDescription, read_scene, scenes
 from ngi.scene.kinds import LookAt
 from ngi.scene.variable import DiscreteVariable, RangedVariable
-from ngi.view.camera import camera_of
-from ngi.view.controls import controls, unnamed_controls
+from ngi.view.inputs import controls, unnamed_controls
+from ngi.view.subject import camera_of
 
 
 def shipped(name: str) -> SceneDescription:

@@ -8,8 +8,7 @@ import yaml
 
 from ngi.machine.backend import activate, dr, llvm_problem
 from ngi.scene import read_scene
-from ngi.scene.clearance import camera_problems
-from ngi.scene.extent import meeting_views
+from ngi.scene.clearance import camera_problems, meeting_views
 from ngi.scene.variable_scene import VariableScene
 from ngi.view.describe import main
 

@@ -18,8 +18,14 @@ from ngi.models.known_light import add_known_light
 from ngi.patches import BUFFER_CHANNELS, CHAIN_CHANNELS, DIRECT_CHANNELS, BufferLayout
 from ngi.scene import read_scene, scenes
 from ngi.view import export
-from ngi.view.network_file import largest_difference, network_file
-from ngi.view.network_metadata import BUFFERS, KNOWN_LIGHT, known_light, scene_metadata
+from ngi.view.network_file import (
+    BUFFERS,
+    KNOWN_LIGHT,
+    known_light,
+    largest_difference,
+    network_file,
+    scene_metadata,
+)
 from ngi.view.trained_run import TrainedRun
 from tests.learn.command_line import run
 

@@ -9,10 +9,9 @@ from skimage.color import rgb2xyz
 viser = pytest.importorskip("viser", reason="needs pip install -e .[viewer]")
 
 from ngi.scene import read_scene, scenes, srgb  # noqa: E402
-from ngi.view.controls import Control, controls  # noqa: E402
-from ngi.view.inputs import Menu, Picker, Slider, Switch, inputs  # noqa: E402
+from ngi.view.inputs import Control, Menu, Picker, Slider, Switch, controls, inputs  # noqa: E402  # noqa: E402
+from ngi.view.page import viser_server  # noqa: E402
 from ngi.view.panel import Panel  # noqa: E402
-from ngi.view.server import viser_server  # noqa: E402
 
 LAMP = [Control("lamp", f"radiance {c}", i, 2, 22, of_colour=True) for i, c in enumerate("rgb")]
 

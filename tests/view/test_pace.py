@@ -6,8 +6,8 @@ from dataclasses import replace
 import pytest
 
 from ngi.render import AnalyticRenderer
-from ngi.view.pace import FEWEST_RAYS, MOVING, SMALLEST, Pace
 from ngi.view.scene_view import Place, SceneView
+from ngi.view.session import FEWEST_RAYS, MOVING, SMALLEST, Pace
 
 RAYS = 16
 WHOLE = Place((0.5,), 256)

@@ -10,8 +10,11 @@ from websockets.exceptions import InvalidStatus  # noqa: E402
 from websockets.sync.client import connect  # noqa: E402
 from websockets.typing import Origin, Subprotocol  # noqa: E402
 
-from ngi.view.page import ErrorPage  # noqa: E402
-from ngi.view.server import fenced, is_own_page  # noqa: E402
+from ngi.view.page import (  # noqa: E402
+    ErrorPage,
+    fenced,
+    is_own_page,
+)
 
 
 @pytest.fixture(scope="module")

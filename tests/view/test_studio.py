@@ -10,12 +10,11 @@ from torch import Tensor
 
 from ngi.evaluate.pictures import error_picture, srgb_picture
 from ngi.render import AnalyticRenderer
-from ngi.view import pace
+from ngi.view import session
 from ngi.view.scene_view import PASS_SAMPLES, Place, SceneView
-from ngi.view.screen import PARTS, Screen
+from ngi.view.screen import CURVES, PARTS, Screen, shown
 from ngi.view.session import SETTLED, Wish
 from ngi.view.studio import KEPT, Shown, Studio
-from ngi.view.tone import CURVES, shown
 
 V = (0.2, 0.5, 0.8)
 
@@ -125,7 +124,7 @@ def test_waiting_ends_when_something_is_wanted() -> None:
 
 
 def test_no_backlog_of_pictures_while_a_slider_moves(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pace, "MOVING", 0)  # as on a slow machine
+    monkeypatch.setattr(session, "MOVING", 0)  # as on a slow machine
     pictures: list[Shown] = []
     studio = Studio(renderer=renderer(), predict=predict)
     studio.open("a", Wish(Place(V, 256), Screen()), pictures.append)

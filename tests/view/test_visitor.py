@@ -16,14 +16,13 @@ viser = pytest.importorskip("viser", reason="needs pip install -e .[viewer]")
 from ngi.evaluate import EvaluationProtocol  # noqa: E402
 from ngi.render import AnalyticRenderer  # noqa: E402
 from ngi.scene import read_scene, scenes  # noqa: E402
-from ngi.view.camera import camera_of  # noqa: E402
-from ngi.view.controls import controls  # noqa: E402
+from ngi.view.inputs import controls  # noqa: E402
+from ngi.view.page import viser_server  # noqa: E402
 from ngi.view.scene_view import Place, SceneView  # noqa: E402
 from ngi.view.screen import Screen  # noqa: E402
-from ngi.view.server import viser_server  # noqa: E402
 from ngi.view.session import Wish  # noqa: E402
 from ngi.view.studio import Shown, Studio  # noqa: E402
-from ngi.view.subject import Subject  # noqa: E402
+from ngi.view.subject import Subject, camera_of  # noqa: E402
 from ngi.view.visitor import Visitor  # noqa: E402
 
 ROOM = read_scene(**scenes()["living-room"])

@@ -11,8 +11,7 @@ from torch import Tensor
 from ngi.learn.samples import Example, Samples
 from ngi.patches import Patches
 from ngi.render.protocol import Deferred, PatchJob, RenderedPatches, Renderer
-from ngi.render.render_inputs import check_states, patch_window
-from ngi.render.tracing import derive_seed
+from ngi.render.tracing import check_states, derive_seed, patch_window
 
 TEST_SEED = 0
 """Of the noise of test frames, and of the way that leads to them."""

@@ -11,7 +11,7 @@ from torch.quasirandom import SobolEngine
 from ngi.learn.samples import Example, Samples
 from ngi.patches import Patches
 from ngi.render.protocol import Deferred, PatchJob, RenderedPatches, Renderer
-from ngi.render.render_inputs import check_states
+from ngi.render.tracing import check_states
 
 TEST_SEED = 0
 """Of the observations of test frames: noise, and where they are taken from."""

@@ -6,9 +6,19 @@ import statistics
 from collections.abc import Callable, Mapping, Sequence
 from itertools import cycle
 
-from torch import Tensor
+import torch
+from torch import Tensor, nn
 
 from ngi.machine.timing import in_turn
+
+
+def show(network: nn.Module, buffers: Tensor, v: Tensor, precision: torch.dtype) -> Tensor:
+    """The network's image, [H, W, 3] on the CPU."""
+    device = next(network.parameters()).device
+    with torch.autocast(device.type, torch.bfloat16, enabled=precision == torch.bfloat16):
+        image: Tensor = network.render(buffers.to(device), v.to(device))  # type: ignore[operator]
+    return image.cpu()
+
 
 MOST_SAMPLES = 2**16
 """Per pixel, beyond which nobody asks for more."""

@@ -15,9 +15,8 @@ from ngi.config.build import plain
 from ngi.config.configuration import scene_place
 from ngi.files.code_versions import record_code_version
 from ngi.machine.provenance import provenance
-from ngi.methods.path_tracing.frame_time import Frame, FrameTimes, largest_fitting
+from ngi.methods.path_tracing.frame_time import Frame, FrameTimes, largest_fitting, show
 from ngi.methods.path_tracing.tracing import PathTracing, Plan
-from ngi.models.frame import show
 
 if TYPE_CHECKING:
     from ngi.evaluate import Evaluation

@@ -11,8 +11,8 @@ from torch import Tensor, nn
 from ngi.denoise import OpenImageDenoise
 from ngi.machine.precision import fast_precision
 from ngi.machine.timing import in_turn
+from ngi.methods.path_tracing.frame_time import show
 from ngi.methods.path_tracing.tracing import PathTracing
-from ngi.models.frame import show
 from ngi.render.mitsuba_renderer import MitsubaRenderer
 from ngi.studies.benchmark.figures import Figure, figure, ratio
 from ngi.studies.benchmark.scenes import Scene

@@ -9,8 +9,8 @@ import torch
 
 from ngi.machine.precision import fast_precision
 from ngi.machine.timing import in_turn
+from ngi.methods.path_tracing.frame_time import show
 from ngi.models import ImageLinear, PatchLinear, PixelGenerator
-from ngi.models.frame import show
 from ngi.render.mitsuba_renderer import MitsubaRenderer
 from ngi.studies.benchmark.figures import Figure, figure
 from ngi.studies.benchmark.scenes import Scene

@@ -8,9 +8,8 @@ import sys
 import hydra
 from omegaconf import DictConfig
 
-from ngi.config.command_words import with_overrides
 from ngi.config.configuration import register
-from ngi.config.hydra_program import MESSAGES, fail, run_program
+from ngi.config.hydra_program import MESSAGES, fail, run_program, with_overrides
 from ngi.config.values import check_values
 from ngi.files.resources import root
 
