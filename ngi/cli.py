@@ -4,8 +4,6 @@ A verb is a module with a function `main`, which is imported when its verb is as
 --help` waits for neither PyTorch nor Mitsuba.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass

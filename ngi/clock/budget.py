@@ -1,7 +1,5 @@
 """How long a run trains: a number of steps, or seconds of run time, and by which clock."""
 
-from __future__ import annotations
-
 import math
 
 CLOCKS = ("wall", "model")

@@ -15,8 +15,6 @@ are, the resolution that patches are cut from (64 to 600 pixels: within 4 % of 1
 and how full the store is.
 """
 
-from __future__ import annotations
-
 import fcntl
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """What a run has done so far, which the model clock counts with."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ngi.render.protocol import RenderedPatches

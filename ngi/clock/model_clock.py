@@ -1,7 +1,5 @@
 """Run time counted with measured costs, so that a busy machine cannot decide a comparison."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from ngi.clock.costs import Costs

@@ -1,7 +1,5 @@
 """Says what this machine has for rendering and training: `ngi doctor`."""
 
-from __future__ import annotations
-
 import os
 import platform
 import shutil

@@ -1,7 +1,5 @@
 """Recomputes runs' metrics from their linear pictures, and compares: `ngi metrics --help`."""
 
-from __future__ import annotations
-
 import json
 import math
 import os

@@ -7,8 +7,6 @@ method, an experiment, a sweep or another budget, once named, is taken at its wo
 What is wrong is said once, with the nearest of what there is.
 """
 
-from __future__ import annotations
-
 import logging
 import os
 import sys

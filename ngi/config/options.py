@@ -1,7 +1,5 @@
 """`key=value` on the command lines of small programs, as `ngi train` takes it, checked by type."""
 
-from __future__ import annotations
-
 import re
 import sys
 from collections.abc import Callable, Sequence

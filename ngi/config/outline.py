@@ -1,7 +1,5 @@
 """Lines that say what a run trains, so that what followed from budget and machine is seen."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping
 from functools import partial

@@ -4,8 +4,6 @@ Hydra calls this (`hydra.callbacks`) in the process that starts the sweep. Proce
 launcher starts have a copy.
 """
 
-from __future__ import annotations
-
 import atexit
 import json
 import os

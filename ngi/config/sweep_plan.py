@@ -1,7 +1,5 @@
 """What the runs of a sweep are, how much of each is done, and how long the rest will take."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections import Counter

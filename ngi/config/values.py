@@ -1,7 +1,5 @@
 """Finds values of a configuration that its parts cannot be made with, before any is made."""
 
-from __future__ import annotations
-
 import inspect
 import math
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """Production denoisers of path-traced images, and training patches whose noise they take off."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Protocol
 

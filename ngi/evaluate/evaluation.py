@@ -1,7 +1,5 @@
 """What one evaluation found: per frame, averaged, for CSV rows, result files and pictures."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass

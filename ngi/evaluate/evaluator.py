@@ -1,7 +1,5 @@
 """Evaluates a prediction function on the test frames of one scene under one protocol."""
 
-from __future__ import annotations
-
 import hashlib
 import logging
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Predictions and references as they were measured, kept as EXR files of linear radiance."""
 
-from __future__ import annotations
-
 import logging
 import shutil
 from collections.abc import Mapping

@@ -3,8 +3,6 @@
 Part of `make setup`, which goes on without them where they cannot be had.
 """
 
-from __future__ import annotations
-
 import os
 import socket
 import sys

@@ -1,7 +1,5 @@
 """LPIPS (Zhang et al. 2018) by the `lpips` package with AlexNet, never with random weights."""
 
-from __future__ import annotations
-
 import pickle
 import warnings
 from collections.abc import Mapping

@@ -4,8 +4,6 @@ MAPE and MAE compare linear radiance, DSSIM and LPIPS tone-mapped sRGB. Values t
 are never hidden: they make each of the four metrics NaN or Inf.
 """
 
-from __future__ import annotations
-
 from typing import TypedDict
 
 import torch

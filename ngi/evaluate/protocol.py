@@ -1,7 +1,5 @@
 """What is measured, as a named object: results of two protocols are never compared."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from dataclasses import asdict, dataclass

@@ -1,7 +1,5 @@
 """Reference images, rendered once to a stated noise level and cached by content."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import logging

@@ -29,8 +29,6 @@ All of them grow with what changes between two frames: compare only sequences of
 number of frames.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 
 from torch import Tensor

@@ -2,8 +2,6 @@
 
 # ruff: noqa: ARG002 - a rule is given more than it need look at
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Protocol
 

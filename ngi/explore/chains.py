@@ -3,8 +3,6 @@
 `ChainState` is what the next step needs and is checkpointed, `ChainInfo` is for logs only.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
 from typing import Self
 

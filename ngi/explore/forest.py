@@ -1,7 +1,5 @@
 """A regression forest: what a value is, on average, where samples of it are near."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import torch

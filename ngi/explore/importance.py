@@ -1,7 +1,5 @@
 """Densities in proportion to what is to be gained, never far below a uniform one."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

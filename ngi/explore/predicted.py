@@ -2,8 +2,6 @@
 
 # ruff: noqa: ARG002 - a sampler is given more than it need look at
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import torch

@@ -2,8 +2,6 @@
 
 # ruff: noqa: ARG002 - a distribution is given more than it need look at
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Protocol

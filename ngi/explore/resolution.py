@@ -1,7 +1,5 @@
 """The resolution of the virtual image patches are cut from (paper, Sec. 6.2)."""
 
-from __future__ import annotations
-
 from typing import Protocol
 
 

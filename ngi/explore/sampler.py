@@ -1,7 +1,5 @@
 """What chooses the states that are rendered: Markov chains, or independent draws."""
 
-from __future__ import annotations
-
 from typing import Any, Protocol
 
 import torch

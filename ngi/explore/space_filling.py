@@ -5,8 +5,6 @@ Neither looks at where a chain stands; with `Always` the chains go from batch to
 
 # ruff: noqa: ARG002 - a distribution is given more than it need look at
 
-from __future__ import annotations
-
 import torch
 from torch import Tensor
 from torch.quasirandom import SobolEngine

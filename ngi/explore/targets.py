@@ -4,8 +4,6 @@ A target is the product of signals of a sample under the network's current weigh
 Where a signal is NaN or infinite, so is the target; `MarkovChains.accept` deals with that.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Protocol
 

@@ -1,7 +1,5 @@
 """Every version of the code that made a run: no part of its identity, but of its record."""
 
-from __future__ import annotations
-
 import json
 import logging
 from functools import cache

@@ -1,7 +1,5 @@
 """Files that survive a crash, a power cut and a full disk, or say clearly that they could not."""
 
-from __future__ import annotations
-
 import io
 import os
 from collections.abc import Iterator

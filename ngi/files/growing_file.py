@@ -1,7 +1,5 @@
 """What files that grow while a run goes on have in common."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 from pathlib import Path

@@ -3,8 +3,6 @@
 It is for arrays, as `RowLog` is for numbers, and NumPy alone reads it.
 """
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Where the configuration, the scenes and the sweeps lie: in the repository or in the wheel."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A CSV file that grows row by row and can be cut back to an earlier step."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A run's folder: its identity, its files, and whether it is new, interrupted or finished."""
 
-from __future__ import annotations
-
 import fcntl
 import hashlib
 import json

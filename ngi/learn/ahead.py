@@ -5,8 +5,6 @@ soon as they have accepted or rejected the last proposals. Rendered early or lat
 or by others, these give the same patches: what changes is how long training waits for them.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, Self
 

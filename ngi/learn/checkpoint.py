@@ -1,7 +1,5 @@
 """Checkpoints that a crash, a full disk or the wrong run can not turn into lost work."""
 
-from __future__ import annotations
-
 import hashlib
 import io
 import logging

@@ -1,7 +1,5 @@
 """What becomes of a run whose program has changed since it was made or interrupted."""
 
-from __future__ import annotations
-
 import logging
 
 from ngi.files import code_versions

@@ -1,7 +1,5 @@
 """The LightningDataModule around the on-the-fly stream."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

@@ -1,7 +1,5 @@
 """SIGTERM and Ctrl-C: a run ends soon, where the same command goes on without a step lost."""
 
-from __future__ import annotations
-
 import logging
 import signal
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """Steps are taken at the learning rates that the schedule says."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from ngi.learn.lightning_api import Callback, LightningModule, Trainer

@@ -1,7 +1,5 @@
 """TensorBoard and MLflow, by Lightning's own loggers."""
 
-from __future__ import annotations
-
 import logging
 from abc import abstractmethod
 from collections.abc import Mapping

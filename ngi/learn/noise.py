@@ -3,8 +3,6 @@
 It is known of patches that are traced in two halves.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import torch

@@ -1,7 +1,5 @@
 """Evaluates a run and keeps what was found: metrics.csv, pictures, result.json."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from ngi.evaluate import Evaluation, Evaluator

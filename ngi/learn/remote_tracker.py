@@ -1,7 +1,5 @@
 """What trackers by other programs have in common: they are called aside, and named alike."""
 
-from __future__ import annotations
-
 import json
 import logging
 import math

@@ -1,7 +1,5 @@
 """The objects that take part in one run."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ngi.clock.budget import Budget

@@ -1,7 +1,5 @@
 """Training samples: what is rendered for each, and the inputs that the network gets of it."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable, Container
 from functools import partial

@@ -1,7 +1,5 @@
 """The learning rate over a run: a function of its steps and of the part of its budget used."""
 
-from __future__ import annotations
-
 import math
 from typing import Protocol
 

@@ -6,8 +6,6 @@ gradient at the output and the norm of their step are taken from the training pa
 Only the chains' current states go through the network for it, all in one pass.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import fields

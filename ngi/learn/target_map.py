@@ -1,7 +1,5 @@
 """The target density over the variables of a scene that has two of them (paper, Fig. 6)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

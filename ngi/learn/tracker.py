@@ -1,7 +1,5 @@
 """Where a run can be watched. Local files are the truth; a tracker is a view of them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Weights & Biases, as its users expect a run there to look."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping
 from pathlib import Path

@@ -6,8 +6,6 @@ Dr.Jit reads $DRJIT_LIBLLVM_PATH and $DRJIT_LIBCUDA_PATH when it is imported, so
 chosen before that.
 """
 
-from __future__ import annotations
-
 import logging
 import os
 import subprocess

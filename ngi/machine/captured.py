@@ -1,7 +1,5 @@
 """Functions of tensors on a GPU whose kernels are recorded once and then launched all at once."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """Energy that processors and GPU have used, from the counters that hardware keeps of it."""
 
-from __future__ import annotations
-
 import ctypes
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

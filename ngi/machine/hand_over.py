@@ -16,8 +16,6 @@ NULL stream"), `src/python/dlpack.cpp` (what it does for which stream; elsewhere
 waits until the array is there), and its author in pull request 377 of mitsuba-renderer/drjit.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

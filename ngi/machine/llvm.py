@@ -4,8 +4,6 @@ Dr.Jit 1.5 refuses LLVM 14, and 15 and 16 abort the whole process at the first r
 select fminimum"), so a library is asked for its version in a child process before it is trusted.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

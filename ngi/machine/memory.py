@@ -1,7 +1,5 @@
 """The memory of this process, which stays for speed, and what else a run takes of its machine."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import sys

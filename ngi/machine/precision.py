@@ -1,7 +1,5 @@
 """Which precision training is fastest in on this machine."""
 
-from __future__ import annotations
-
 
 def fast_precision() -> str:
     """Lightning's 'bf16-mixed' where the processor or GPU computes in bfloat16, else '32-true'.

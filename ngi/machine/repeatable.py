@@ -1,7 +1,5 @@
 """A run repeats bit for bit on a GPU, too."""
 
-from __future__ import annotations
-
 import os
 
 CUBLAS_WORKSPACE = ":4096:8"

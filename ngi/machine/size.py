@@ -1,7 +1,5 @@
 """Which size of network suits this machine, and how it begins a run of a given length."""
 
-from __future__ import annotations
-
 SECONDS_PER_BATCH = 15.0
 """Of the budget, for each batch that is rendered before the first is reused."""
 

@@ -1,7 +1,5 @@
 """Seconds of functions that are called in turn, so that a busy machine slows all of them."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable

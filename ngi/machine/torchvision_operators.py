@@ -6,8 +6,6 @@ exist", and with it `import lpips`, `torchmetrics` and `lightning`. None of them
 operators here, they only have to be declared.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import sys
 from importlib.machinery import EXTENSION_SUFFIXES, ExtensionFileLoader, FileFinder

@@ -1,7 +1,5 @@
 """Our neural renderer: encoded buffers and scene vector to radiance, per pixel."""
 
-from __future__ import annotations
-
 import torch
 from torch import Tensor, nn
 

@@ -1,7 +1,5 @@
 """What networks of buffers and scene vectors have to be given, and made with."""
 
-from __future__ import annotations
-
 from torch import Tensor
 
 from ngi.patches import BufferLayout

@@ -1,7 +1,5 @@
 """Light that no network has to learn, because the buffers tell it."""
 
-from __future__ import annotations
-
 import torch
 from torch import Tensor
 

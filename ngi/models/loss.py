@@ -1,7 +1,5 @@
 """The training loss: L1 and structural dissimilarity of log1p radiance, one value per sample."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Protocol
 

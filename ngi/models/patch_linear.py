@@ -1,7 +1,5 @@
 """A linear layer in which what is constant over a patch costs as much as a bias."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any

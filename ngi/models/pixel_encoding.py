@@ -1,7 +1,5 @@
 """What a network is given of a pixel: the stored buffers, and what follows from them."""
 
-from __future__ import annotations
-
 import math
 
 import torch

@@ -1,7 +1,5 @@
 """The neural renderer: from first-intersection buffers and scene vector to radiance, per pixel."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import torch

@@ -6,8 +6,6 @@ and activation fused, and what the first layer adds to all pixels of a patch is 
 weight, so that neither it nor its gradient takes a pass of its own.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

@@ -3,8 +3,6 @@
 Nothing here calls `.backward()` or touches a parameter's `.grad`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 

@@ -1,7 +1,5 @@
 """How far an optimiser's step for a gradient would go, parameter by parameter."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, Protocol, Self
 

@@ -1,7 +1,5 @@
 """A renderer made of closed formulas, which tests the whole pipeline in seconds."""
 
-from __future__ import annotations
-
 from math import pi, sqrt
 
 import torch

@@ -1,7 +1,5 @@
 """What renderers made of closed formulas share: pixels, seeds, noise; all but the formula."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from hashlib import sha256
 from math import sqrt

@@ -1,7 +1,5 @@
 """OpenEXR files of linear radiance."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -5,8 +5,6 @@ the process, or Linux does. There `ngi.render.tracing` keeps launches small befo
 what workers render is rendered again.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Iterable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Closed formulas with rare effects: a family of scenes in which everything rare has a knob."""
 
-from __future__ import annotations
-
 from math import pi, sqrt
 
 import torch

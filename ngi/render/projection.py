@@ -1,7 +1,5 @@
 """Where in the image a point of the scene is."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """What every renderer of variable scenes offers; Mitsuba's and the analytic one implement it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Which sampler a variable scene asks for, as far as can be told before anything is rendered."""
 
-from __future__ import annotations
-
 from ngi.render.materials import Material
 from ngi.scene.kinds import (
     Direction,

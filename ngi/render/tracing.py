@@ -3,8 +3,6 @@
 And how many paths it asks for at a time.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from hashlib import blake2b

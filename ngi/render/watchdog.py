@@ -1,7 +1,5 @@
 """Notices workers that do not answer any more, and ends them as if they had died."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """Shares requests for patches out among renderers elsewhere, and replaces those that are lost."""
 
-from __future__ import annotations
-
 import logging
 import threading
 from collections import deque

@@ -4,8 +4,6 @@ Neither forked, since CUDA and Dr.Jit do not survive that, nor started by multip
 would run the main module again and fails below some launchers of sweeps.
 """
 
-from __future__ import annotations
-
 import os
 import pickle
 import signal

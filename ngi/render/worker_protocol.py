@@ -1,7 +1,5 @@
 """What passes between a pool and its workers, and what a worker does wherever it runs."""
 
-from __future__ import annotations
-
 import pickle
 import sys
 import traceback

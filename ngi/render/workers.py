@@ -1,7 +1,5 @@
 """Patches rendered by several processes, of this machine or of a cluster."""
 
-from __future__ import annotations
-
 import pickle
 import weakref
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """Stored patches on disk: each is written once, in segment files beside the checkpoints."""
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Iterable, Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Patches as they are kept: 45 KB for a 32 x 32 patch with all 16 channels."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields, replace
 from typing import Self
 

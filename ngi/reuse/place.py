@@ -1,7 +1,5 @@
 """Where stored patches are kept."""
 
-from __future__ import annotations
-
 import logging
 
 import torch

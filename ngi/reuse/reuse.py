@@ -1,7 +1,5 @@
 """All that decides about the reuse of patches in one run."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ngi.reuse.archive import PatchArchive

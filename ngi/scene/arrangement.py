@@ -7,8 +7,6 @@ ray through the instance would cost more than it saves. A mesh that moves as a w
 instance, so that its vertices are never rewritten.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from xml.etree import ElementTree
 

@@ -1,7 +1,5 @@
 """Images and meshes that variables swap in, loaded as those that scene.xml names."""
 
-from __future__ import annotations
-
 import copy
 from pathlib import Path
 from xml.etree import ElementTree

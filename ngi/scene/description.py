@@ -1,7 +1,5 @@
 """What a variable scene is: a Mitsuba 3 file, and what varies in it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property

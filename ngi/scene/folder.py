@@ -3,8 +3,6 @@
 Everything that can be wrong in either is found here, before Mitsuba is even imported.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Where the things are that a scene's variables move along, as a function of v."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

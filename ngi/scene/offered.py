@@ -4,8 +4,6 @@ Every parameter that `mi.traverse` offers of a plugin is named, with the propert
 that vary it or with the reason why none does. docs/scenes.md shows it as a table.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import chain

@@ -1,7 +1,5 @@
 """Where an object of a loaded scene stands, as all variables that act on it say, and its light."""
 
-from __future__ import annotations
-
 from functools import cached_property
 from typing import Protocol
 

@@ -1,7 +1,5 @@
 """The transfer curve of sRGB (IEC 61966-2-1), between linear numbers and those of a screen."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

@@ -1,7 +1,5 @@
 """4 x 4 matrices of column vectors, as Mitsuba has them."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

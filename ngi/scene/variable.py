@@ -4,8 +4,6 @@ The kinds of variables are in `ngi.scene.kinds`. They know their components with
 finds what they change in a loaded scene and returns the function that writes it.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

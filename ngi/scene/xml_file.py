@@ -1,7 +1,5 @@
 """Reads XML that anybody may have written, with the $names in it replaced."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """YAML that anybody may have written, read key by key; errors name file, key and value."""
 
-from __future__ import annotations
-
 import reprlib
 import sys
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Shows a trained network in the browser: `ngi view --help`."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 from contextlib import closing

@@ -1,7 +1,5 @@
 """What varies, or could vary, in a scene: `ngi describe SCENE`."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

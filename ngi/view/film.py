@@ -1,7 +1,5 @@
 """A path through a scene as networks and path tracer show it, frame by frame, and how steady."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """What a user moves for each part of v: a slider, a switch, a menu, or a colour picker."""
 
-from __future__ import annotations
-
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """MP4 files that every browser plays. Needs PyAV (`pip install -e .[video]`)."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress

@@ -1,7 +1,5 @@
 """A network as the content of an ONNX file, and what a program that embeds it has to know."""
 
-from __future__ import annotations
-
 import copy
 import json
 import logging

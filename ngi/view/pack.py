@@ -1,7 +1,5 @@
 """What is left of a run where only its network is wanted: `python -m ngi.view.pack --help`."""
 
-from __future__ import annotations
-
 import json
 import sys
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """The web server whose page shows a network, to any number of browsers and to no other page."""
 
-from __future__ import annotations
-
 import logging
 import re
 import time

@@ -1,7 +1,5 @@
 """The sliders, switches and menus of one browser."""
 
-from __future__ import annotations
-
 import json
 import random
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """What a run's folder says of its parts, made again; nothing but what comes with this program."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Which configurations are shown: one that is given, a hard frame, or a path through several."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What can be seen of one configuration: the network's picture, the buffers, a path-traced one."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from time import perf_counter

@@ -1,7 +1,5 @@
 """What the viewer's picture shows of a configuration, as pixels, and through which curve."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

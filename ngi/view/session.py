@@ -1,7 +1,5 @@
 """What one browser wants to see, which picture of it is computed next, and how fine it is."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 

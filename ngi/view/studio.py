@@ -1,7 +1,5 @@
 """Makes the pictures that all browsers ask for, one after the other, in the caller's thread."""
 
-from __future__ import annotations
-
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Hashable

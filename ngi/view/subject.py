@@ -1,7 +1,5 @@
 """What a page is about: a scene that a network shows, and the camera in it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

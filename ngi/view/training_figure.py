@@ -1,7 +1,5 @@
 """A run in one picture while it trains: errors, losses and reuse, chains, the hardest patches."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """One browser that looks at a page: its controls, its camera, its picture."""
 
-from __future__ import annotations
-
 import io
 import shlex
 from collections import deque

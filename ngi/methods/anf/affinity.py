@@ -1,7 +1,5 @@
 """Filters whose weights are affinities of features (Işık et al. 2021, Sec. 3.3 and 3.4)."""
 
-from __future__ import annotations
-
 import torch
 import torch.nn.functional as F
 from torch import Tensor

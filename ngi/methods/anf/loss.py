@@ -1,7 +1,5 @@
 """The loss of sequences of frames (Işık et al. 2021, Sec. 4)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import torch

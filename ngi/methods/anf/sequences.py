@@ -1,7 +1,5 @@
 """Training samples of a denoiser: sequences of noisy frames along paths through the scene."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 

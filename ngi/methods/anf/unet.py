@@ -1,7 +1,5 @@
 """A network that sees an image at several resolutions (Ronneberger et al. 2015)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """The network of Compositional Neural Scene Representations (CNSR), a method to compare with."""
 
-from __future__ import annotations
-
 import torch
 import torch.nn.functional as F
 from torch import Tensor, nn

@@ -1,7 +1,5 @@
 """Training samples of CNSR: images of one scene configuration, seen by several cameras."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import torch

@@ -1,7 +1,5 @@
 """How long a frame takes, and how many samples per pixel fit into a time."""
 
-from __future__ import annotations
-
 import statistics
 from collections.abc import Callable, Mapping, Sequence
 from itertools import cycle

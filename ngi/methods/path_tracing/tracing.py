@@ -1,7 +1,5 @@
 """Path tracing as it would be shown: few samples per pixel, anew in every frame, denoised."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import count
 

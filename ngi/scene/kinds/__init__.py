@@ -1,7 +1,5 @@
 """Every kind of variable, by the name that YAML uses. A new kind is a class and a line here."""
 
-from __future__ import annotations
-
 from ngi.scene.kinds.appearance import (
     Albedo,
     Intensity,

@@ -1,7 +1,5 @@
 """Variables of materials and lights."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property

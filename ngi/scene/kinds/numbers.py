@@ -3,8 +3,6 @@
 Which plugins have them, and what else of Mitsuba's varies or does not: `ngi.scene.offered`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar, Self
 

@@ -1,7 +1,5 @@
 """Variables of where objects are, which of them are there, and of a mesh's shape."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, Self
 

@@ -1,7 +1,5 @@
 """Variables of the camera, and of where the sun stands."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, Self
 

@@ -1,7 +1,5 @@
 """The box of a scene's geometry, read from its file and the meshes, without Mitsuba."""
 
-from __future__ import annotations
-
 from itertools import product
 from pathlib import Path
 from xml.etree.ElementTree import Element

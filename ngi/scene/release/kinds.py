@@ -1,7 +1,5 @@
 """Kinds of variables that only scenes in this format have."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

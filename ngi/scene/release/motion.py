@@ -1,7 +1,5 @@
 """Where a variable shape may stand: T(min + u * range) * R(axis, min_angle + u * range_angle)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 

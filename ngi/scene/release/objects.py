@@ -4,8 +4,6 @@ Mitsuba 3 cannot instance emitters. An instance of a group with emitting shapes 
 these become shapes of the scene, which follow the instance's variables beside what is left of it.
 """
 
-from __future__ import annotations
-
 import copy
 from itertools import chain, count
 from xml.etree.ElementTree import Element, SubElement

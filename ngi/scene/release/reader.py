@@ -1,7 +1,5 @@
 """Reads a scene in the tagged format of the paper's released program."""
 
-from __future__ import annotations
-
 from hashlib import sha256
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement

@@ -1,7 +1,5 @@
 """The XML of a tagged scene file, which remembers the line of every element."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from logging import getLogger

@@ -1,7 +1,5 @@
 """The tags that make an element variable, with the defaults of the released renderer."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from difflib import get_close_matches
 from math import inf, nextafter

@@ -1,7 +1,5 @@
 """The variables of BSDFs, emitters and sensors, and what the document needs for them."""
 
-from __future__ import annotations
-
 from math import inf, nextafter
 from xml.etree.ElementTree import Element, SubElement
 
