@@ -29,10 +29,10 @@ SAMPLES_PER_PIXEL = 8
 def frames(scene: Scene, *, repeats: int, seconds: float) -> list[Figure]:
     """Milliseconds by part, of frames whose v is a new one every time.
 
-    The denoiser is given buffers for nothing: it needs those without direct light, which take less
-    than ours.
+    The denoiser is given buffers for nothing: it needs those of the first hit without direct light,
+    which take less than ours.
     """
-    renderer = MitsubaRenderer(scene=scene.read(), direct="traced")
+    renderer = MitsubaRenderer(scene=scene.read(), direct="traced", specular="traced")
     network = OURS.network(
         layout=renderer.layout,
         scene_dimensions=renderer.dimensions,
