@@ -67,8 +67,11 @@ def direct_light(
     )
     by_emitter = value * irradiance * dr.select(towards.delta, 1, _share(towards.pdf, density))
     scattered = active & (sample.pdf > 0)
-    lit = scene.ray_intersect(hit.spawn_ray(hit.to_world(sample.wo)), scattered)
-    by_bsdf = weight * _seen(scene, hit, lit, sample)
+    ray = hit.spawn_ray(hit.to_world(sample.wo))
+    met = scene.ray_intersect_preliminary(ray, False, scattered)
+    scattered = scattered & _may_emit(met)
+    lit = met.compute_surface_interaction(ray, mi.RayFlags.All, scattered)
+    by_bsdf = weight * _seen(scene, hit, lit, sample, scattered)
     return dr.select(sampled, by_emitter, 0) + dr.select(scattered, by_bsdf, 0)
 
 
@@ -77,14 +80,22 @@ def _seen(
     hit: mi.SurfaceInteraction3f,
     lit: mi.SurfaceInteraction3f,
     sample: mi.BSDFSample3f,
+    active: mi.Bool,
 ) -> mi.Color3f:
     """What an emitter that the BSDF sample meets sends, times the sample's share."""
-    emitter = lit.emitter(scene)
+    emitter = lit.emitter(scene, active)
     if emitter is None:  # in a scalar variant
         return mi.Color3f(0)
-    density = scene.pdf_emitter_direction(hit, mi.DirectionSample3f(scene, lit, hit))
+    density = scene.pdf_emitter_direction(hit, mi.DirectionSample3f(scene, lit, hit), active)
     delta = mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
-    return emitter.eval(lit) * dr.select(delta, 1, _share(sample.pdf, density))
+    return emitter.eval(lit, active) * dr.select(delta, 1, _share(sample.pdf, density))
+
+
+def _may_emit(met: mi.PreliminaryIntersection3f) -> mi.Bool:
+    """Where a ray meets an emitter, or nothing but the environment; the rest need not be known."""
+    if met.shape is None:  # in a scalar variant
+        return mi.Bool(True)
+    return dr.select(met.is_valid(), met.shape.is_emitter(), True)
 
 
 def _share(density: mi.Float, other: mi.Float) -> mi.Float:

@@ -38,15 +38,16 @@ class FirstHit:
         light_point: what `direct_light` takes; read where the layout has direct light.
         """
         traced: dict[str, list[mi.Float]] = {}
-        if self.chain is not None:
+        if self.chain is None:
+            hit = scene.ray_intersect(ray)
+        else:
             end = self.chain.follow(scene, ray)
-            ray = end.ray
+            ray, hit = end.ray, end.hit
             traced = {
                 "throughput": list(end.throughput),
                 "chain_roughness": [end.roughness],
                 "emission": list(end.emission),
             }
-        hit = scene.ray_intersect(ray)
         valid = hit.is_valid()
         if "direct" in self.layout.names:
             direct = direct_light(scene, hit, light_point)

@@ -9,6 +9,7 @@ tracer would choose one at random.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +30,8 @@ MAX_SPECULAR_BOUNCES = 12
 class ChainEnd:
     """Where specular bounces have led.
 
-    ray: the last segment, still to be intersected.
+    ray: the last segment.
+    hit: what it meets, or nothing.
     throughput: product of the weights of the bounces, 1 where there was none.
     roughness: sqrt(sum of alpha^2) over the bounces.
     emission: linear radiance of every emitter on the way, the environment included, times the
@@ -38,6 +40,7 @@ class ChainEnd:
     """
 
     ray: mi.Ray3f
+    hit: mi.SurfaceInteraction3f
     throughput: mi.Color3f
     roughness: mi.Float
     emission: mi.Color3f
@@ -59,22 +62,29 @@ class SpecularChain:
     buffers: tuple[str, ...]
 
     def follow(self, scene: mi.Scene, ray: mi.Ray3f) -> ChainEnd:
-        """A loop in the kernel, or in Python where the variant is scalar."""
+        """A loop in the kernel, or in Python where the variant is scalar.
+
+        No ray is intersected twice: the loop hands on where it meets something, and at what.
+        """
 
         def step(
             ray: mi.Ray3f,
+            met: mi.PreliminaryIntersection3f,
             throughput: mi.Color3f,
             variance: mi.Float,
             emitted: mi.Color3f,
             bounces: mi.UInt32,
             active: mi.Bool,
-        ) -> tuple[mi.Ray3f, mi.Color3f, mi.Float, mi.Color3f, mi.UInt32, mi.Bool]:
-            hit = scene.ray_intersect(ray, active)
+        ) -> tuple[Any, ...]:
+            hit = met.compute_surface_interaction(ray, mi.RayFlags.All, active)
             emitted = emitted + throughput * emission(scene, hit)
             active = active & hit.is_valid() & (bounces < self.maximum_bounces)
             goes_on, direction, weight, alpha = self._bounce(hit, active)
+            beyond = hit.spawn_ray(hit.to_world(direction))
+            ray = dr.select(goes_on, beyond, ray)
             return (
-                dr.select(goes_on, hit.spawn_ray(hit.to_world(direction)), ray),
+                ray,
+                dr.select(goes_on, scene.ray_intersect_preliminary(ray, False, goes_on), met),
                 dr.select(goes_on, throughput * weight, throughput),
                 dr.select(goes_on, variance + dr.square(alpha), variance),
                 emitted,
@@ -82,9 +92,10 @@ class SpecularChain:
                 goes_on,
             )
 
-        ray, throughput, variance, emitted, segments, _ = dr.while_loop(
+        ray, met, throughput, variance, emitted, segments, _ = dr.while_loop(
             state=(
                 mi.Ray3f(ray),
+                scene.ray_intersect_preliminary(ray, True),
                 mi.Color3f(1),
                 mi.Float(0),
                 mi.Color3f(0),
@@ -94,9 +105,10 @@ class SpecularChain:
             cond=lambda *state: state[-1],
             body=step,
         )
+        hit = met.compute_surface_interaction(ray)
         # Emitter, end of the chain, a vertex at each of its bounces: one more than the segments.
         lit = mi.Bool(True) if self.longest_path < 0 else segments < self.longest_path
-        return ChainEnd(ray, throughput, dr.sqrt(variance), emitted, lit)
+        return ChainEnd(ray, hit, throughput, dr.sqrt(variance), emitted, lit)
 
     def _bounce(
         self, hit: mi.SurfaceInteraction3f, active: mi.Bool
