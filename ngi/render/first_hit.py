@@ -9,6 +9,7 @@ import numpy as np
 
 from ngi.machine.backend import dr, mi
 from ngi.patches import BufferLayout
+from ngi.render.caustics import Caustics, caustics_of
 from ngi.render.direct_light import direct_light, emission
 from ngi.render.materials import Material, collect_materials, evaluate_materials
 from ngi.render.needs import buffer_needs, direct_need, needed_layout
@@ -28,14 +29,20 @@ class FirstHit:
     materials: list[Material]
     bounds: tuple[tuple[float, ...], tuple[float, ...]]
     chain: SpecularChain | None
+    caustics: Caustics | None
 
     def channels(
-        self, scene: mi.Scene, ray: mi.Ray3f, light_point: Sequence[mi.Float]
+        self,
+        scene: mi.Scene,
+        ray: mi.Ray3f,
+        light_point: Sequence[mi.Float],
+        caustics: mi.Float | None = None,
     ) -> list[mi.Float]:
         """One value per channel and ray; a ray that misses gives zeros, but the environment's
         emission and the throughput.
 
         light_point: what `direct_light` takes; read where the layout has direct light.
+        caustics: the pictures of `self.caustics`, whose light is added to the direct light.
         """
         traced: dict[str, list[mi.Float]] = {}
         if self.chain is None:
@@ -51,8 +58,10 @@ class FirstHit:
         valid = hit.is_valid()
         if "direct" in self.layout.names:
             direct = direct_light(scene, hit, light_point)
+            if self.caustics is not None:
+                direct += self.caustics.radiance(caustics, hit)
             if self.chain is not None:
-                direct = dr.select(end.lit, end.throughput * direct, 0)
+                direct = dr.select(self.chain.lit(end.segments), end.throughput * direct, 0)
             traced["direct"] = list(direct)
         low, high = map(np.array, self.bounds)
         extent = high - low
@@ -76,22 +85,33 @@ class FirstHit:
 
 
 def first_hit_of(
-    scene: VariableScene, *, needed_only: bool, trace_specular: bool, trace_direct: bool
+    scene: VariableScene,
+    *,
+    needed_only: bool,
+    trace_specular: bool,
+    trace_direct: bool,
+    trace_caustics: bool,
 ) -> FirstHit:
     """The buffers that a scene needs, or all; ValueError for a BSDF of an unknown kind.
 
     trace_specular: those of the first hit that is not specular (paper, Fig. 10).
     trace_direct: the direct light too, see `ngi.render.direct_light`.
+    trace_caustics: in it the caustics.
     """
     materials = collect_materials(scene.bsdfs())
     needs = buffer_needs(scene, materials)
     layout = needed_layout(needs) if needed_only else BufferLayout()
     if trace_direct and (direct_need(scene).needed or not needed_only):
         layout = layout.adding(["direct"])
-    chain = specular_chain(scene, materials) if trace_specular else None
+    specular = specular_chain(scene, materials)
+    chain = specular if trace_specular else None
+    caustics = None
+    if trace_caustics and specular is not None and "direct" in layout.names:
+        caustics = caustics_of(scene, specular)
     return FirstHit(
         layout=layout if chain is None else layout.adding(chain.buffers),
         materials=materials,
         bounds=scene.description.bounds,
         chain=chain,
+        caustics=caustics,
     )

@@ -18,6 +18,7 @@ from torch import Tensor
 
 from ngi.machine.backend import dr, mi
 from ngi.machine.hand_over import stacked
+from ngi.render.caustics import photon_points
 from ngi.render.direct_light import light_points
 from ngi.render.first_hit import FirstHit
 from ngi.render.fitting import does_not_fit
@@ -41,6 +42,8 @@ class JitTracer(Tracer):
 
     def __init__(self, *, scene: mi.Scene, first_hit: FirstHit) -> None:
         self._scene = scene
+        caustics = first_hit.caustics
+        self._photons = photon_points() if caustics is not None else []
         self._points: dict[int, tuple[mi.Point2f, list[mi.Float]]] = {}
         # Plain functions, not methods: a frozen function follows the arrays of its arguments only,
         # and holds what is constant for this tracer in its closure.
@@ -61,6 +64,7 @@ class JitTracer(Tracer):
             view: _View,
             points: mi.Point2f,
             light_points: list[mi.Float],
+            photons: list[mi.Float],
             samples: int,
             rays: int,
         ) -> list[mi.Float]:
@@ -69,7 +73,9 @@ class JitTracer(Tracer):
             sample = index - pixel * view.samples
             jitter = dr.gather(mi.Point2f, points, sample)
             light_point = [dr.gather(mi.Float, numbers, sample) for numbers in light_points]
-            channels = first_hit.channels(scene, view.rays(scene, pixel, jitter), light_point)
+            light = caustics.pictures(scene, photons) if caustics is not None else None
+            ray = view.rays(scene, pixel, jitter)
+            channels = first_hit.channels(scene, ray, light_point, light)
             return _block_sums(channels, samples)
 
         self._radiance = _replayed(trace_radiance)
@@ -90,7 +96,8 @@ class JitTracer(Tracer):
             self._points[samples] = _points(samples)
         view = _View.of(window, samples)
         rays = window.width * window.height * samples
-        sums = self._buffers(self._scene, view, *self._points[samples], samples, rays)
+        points = self._points[samples]
+        sums = self._buffers(self._scene, view, *points, self._photons, samples, rays)
         return _pending(sums, window, samples)
 
     def _prepare(self, window: Window) -> None:

@@ -24,6 +24,7 @@ from ngi.render.tracing import (
     Tracer,
     bands,
     check_states,
+    choose,
     derive_seed,
     passes,
     patch_window,
@@ -79,10 +80,14 @@ class MitsubaRenderer(Renderer):
         require_positive(
             patch_size=patch_size, **{name: n for name, n in given.items() if n is not None}
         )
-        for name, choice in (("specular", specular), ("direct", direct)):
-            if choice not in ("learned", "traced"):
-                raise ValueError(f"renderer.{name} '{choice}': choose 'learned' or 'traced'")
+        choose("specular", specular, among=("learned", "traced"))
+        choose("direct", direct, among=("learned", "traced", "with_caustics"))
         self._variant = activate(backend)
+        if direct == "with_caustics" and self._variant == "scalar_rgb":
+            raise ValueError(
+                "renderer.direct 'with_caustics': Mitsuba's scalar variant is too slow for photons; "
+                "use renderer.direct=traced, or see what `ngi doctor` says about LLVM"
+            )
         # Scenes of a sweep's finished jobs are left in cycles, and slow every launch down.
         gc.collect()
         self._scene = VariableScene(scene, arrange=needed_only)
@@ -91,7 +96,8 @@ class MitsubaRenderer(Renderer):
             self._scene,
             needed_only=needed_only,
             trace_specular=specular == "traced",
-            trace_direct=direct == "traced",
+            trace_direct=direct != "learned",
+            trace_caustics=direct == "with_caustics",
         )
         self.buffer_samples = buffer_samples or BUFFER_SAMPLES[self._variant]
         self._tracer = _tracer(self._variant, self._scene.scene, first_hit)

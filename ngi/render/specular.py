@@ -36,7 +36,7 @@ class ChainEnd:
     roughness: sqrt(sum of alpha^2) over the bounces.
     emission: linear radiance of every emitter on the way, the environment included, times the
         throughput up to it.
-    lit: whether the scene's paths are long enough to bring an emitter's light to the end.
+    segments: of the path so far, one more than there were bounces.
     """
 
     ray: mi.Ray3f
@@ -44,7 +44,7 @@ class ChainEnd:
     throughput: mi.Color3f
     roughness: mi.Float
     emission: mi.Color3f
-    lit: mi.Bool
+    segments: mi.UInt32
 
 
 @dataclass(frozen=True)
@@ -106,9 +106,11 @@ class SpecularChain:
             body=step,
         )
         hit = met.compute_surface_interaction(ray)
-        # Emitter, end of the chain, a vertex at each of its bounces: one more than the segments.
-        lit = mi.Bool(True) if self.longest_path < 0 else segments < self.longest_path
-        return ChainEnd(ray, hit, throughput, dr.sqrt(variance), emitted, lit)
+        return ChainEnd(ray, hit, throughput, dr.sqrt(variance), emitted, segments)
+
+    def lit(self, segments: mi.UInt32) -> mi.Bool:
+        """Whether the scene's paths are long enough to bring an emitter's light over one more."""
+        return mi.Bool(True) if self.longest_path < 0 else segments < self.longest_path
 
     def _bounce(
         self, hit: mi.SurfaceInteraction3f, active: mi.Bool

@@ -94,6 +94,12 @@ def require_positive(**numbers: int) -> None:
             raise ValueError(f"renderer: {name} is {number}; expected a positive integer")
 
 
+def choose(name: str, choice: str, *, among: tuple[str, ...]) -> None:
+    """ValueError, naming it, for a choice that there is not."""
+    if choice not in among:
+        raise ValueError(f"renderer.{name} '{choice}': choose one of {', '.join(among)}")
+
+
 def check_states(states: Tensor, dimensions: int) -> None:
     """ValueError for states that are not [n, D + 2] numbers in [0, 1]."""
     if states.ndim != 2 or states.shape[1] != dimensions + 2:

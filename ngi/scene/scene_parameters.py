@@ -123,11 +123,7 @@ class SceneParameters(Parameters):
 
     def _group_of(self, object_id: str) -> str:
         """The group that an instance shows, which is not a part of it; other ids as they are."""
-        references = {
-            instance.get("id"): ref.get("id", "")
-            for instance in self.document.root.iterfind(".//shape[@type='instance']")
-            for ref in instance.findall("ref")
-        }
+        references = self._references()
         group = references.get(object_id)
         if group is None:
             return object_id
@@ -150,3 +146,17 @@ class SceneParameters(Parameters):
         for placement in self._placements.values():
             placement.flush()
         super().update()
+
+    def groups(self) -> list[tuple[mi.Shape, mi.Shape]]:
+        """The group that each instance shows, and the instance."""
+        return [
+            (self.object(group), self.object(name)) for name, group in self._references().items()
+        ]
+
+    def _references(self) -> dict[str, str]:
+        """Id of an instance -> id of the group that it shows."""
+        return {
+            instance.get("id", ""): ref.get("id", "")
+            for instance in self.document.root.iterfind(".//shape[@type='instance']")
+            for ref in instance.findall("ref")
+        }

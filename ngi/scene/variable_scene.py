@@ -95,6 +95,21 @@ class VariableScene:
                 bsdfs.append(bsdf)
         return bsdfs
 
+    def placed(self) -> list[tuple[mi.Shape, mi.Shape | None]]:
+        """Every shape that a ray can hit, with the instance that shows it, if any: as often as
+        there are such instances.
+        """
+        shapes = [shape for shape in self.shapes if has_surface(shape)]
+        groups = self._parameters.groups()
+        shown = [
+            (shape, instance)
+            for group, instance in groups
+            for shape in shapes
+            if self._parameters.belongs_to(shape, group)
+        ]
+        inside = [shape for shape, _ in shown]
+        return [(shape, None) for shape in shapes if shape not in inside] + shown
+
     def apply(self, scene_vector: ArrayLike) -> None:
         """Sets the scene to v of shape [D] in [0, 1]; ValueError for any other v.
 
