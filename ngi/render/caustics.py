@@ -188,8 +188,7 @@ def photon_points() -> list[mi.Float]:
 
 
 def _is_diffuse(hit: mi.SurfaceInteraction3f) -> mi.Bool:
-    flags = hit.bsdf().flags(hit.is_valid())
-    return hit.is_valid() & mi.has_flag(flags, mi.BSDFFlags.DiffuseReflection)
+    return hit.is_valid() & mi.has_flag(hit.bsdf().flags(), mi.BSDFFlags.DiffuseReflection)
 
 
 def _bilinear(x: mi.Float, y: mi.Float) -> list[tuple[mi.Int32, mi.Int32, mi.Float]]:
