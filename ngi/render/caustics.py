@@ -23,7 +23,7 @@ PHOTONS = 2**12
 CELLS = 128
 """Of a picture's finest level, along the longest side of the scene's bounds."""
 
-LEVELS = 4
+LEVELS = 5
 """Each has cells twice as wide as the one before."""
 
 MAX_BOUNCES = 6
@@ -221,13 +221,14 @@ def _resolved(sums: list[mi.Float]) -> mi.Float:
         dr.eval(levels[-1])
     index = dr.arange(mi.UInt32, 6 * CELLS * CELLS)
     column, row, picture = index % CELLS, index // CELLS % CELLS, index // (CELLS * CELLS)
-    light, depth = mi.Color3f(0), mi.Float(-2 * CELLS)
+    light, depth, photons = mi.Color3f(0), mi.Float(-2 * CELLS), mi.Float(0)
     for level in reversed(range(LEVELS)):
         values = _interpolated(levels[level], picture, column, row, level)
         total = mi.Color3f(values[:3])
         mean = dr.mean(total)
-        photons = 4 * dr.square(mean) / dr.maximum(values[3], _RESOLUTION)
-        enough = dr.clip(2 * photons / ENOUGH_PHOTONS - 1, 0, 1)
+        # What is expected of this level: chosen by what it has, too much light would be found.
+        enough = 1 if level == LEVELS - 1 else dr.clip(2 * photons / ENOUGH_PHOTONS - 1, 0, 1)
+        photons = dr.square(mean) / dr.maximum(values[3], _RESOLUTION)  # a quarter of four cells'
         light = dr.lerp(light, total / 4**level, enough)
         depth = dr.select(mean > 0, values[4] / mean, depth)
     packed = dr.zeros(mi.Float, 4 * 6 * CELLS * CELLS)

@@ -254,7 +254,7 @@ def test_sixteen_points_are_spread_evenly_in_each_pair_used_together() -> None:
 
 
 def test_other_words_are_refused(load) -> None:
-    with pytest.raises(ValueError, match=r"renderer\.direct 'foo': choose 'learned' or 'traced'"):
+    with pytest.raises(ValueError, match=r"renderer\.direct 'foo': choose one of learned, "):
         load(FLOOR + BULB, backend="scalar", direct="foo")
 
 

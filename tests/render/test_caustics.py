@@ -1,0 +1,199 @@
+"""Caustics against closed forms, and against Mitsuba's path tracer behind a glass sphere."""
+
+import numpy as np
+import pytest
+import torch
+
+from ngi.machine.backend import llvm_problem, mi
+from ngi.render.caustics import photon_points
+from ngi.render.first_hit import first_hit_of
+from ngi.render.mitsuba_renderer import MitsubaRenderer
+from ngi.scene import read_scene
+from ngi.scene.variable_scene import VariableScene
+from ngi.studies.benchmark.measure import counted_compilations
+from tests.render.optics import ORIGIN, dot, fresnel, on_plane, rays, rectangle, unit, write_scene
+from tests.render.test_direct_light import (
+    ALBEDO,
+    BULB,
+    BULB_AT,
+    DIM,
+    FLOOR,
+    INTENSITY,
+    MIRROR,
+    PAINT,
+    REFLECTANCE,
+)
+
+RESOLUTION = 24
+WALL_AT = 2.2
+WALL = f'<rotate y="1" angle="-90"/><scale value="2"/><translate x="{WALL_AT}"/>'
+BULB_BEHIND = BULB_AT * [-1, 1, 1] + [2 * WALL_AT, 0, 0]
+PANE = '<scale value="2"/><translate z="1"/>'
+THIN = '<bsdf type="thindielectric" id="thin"><float name="int_ior" value="1.5"/></bsdf>'
+TABLE = '<bsdf type="diffuse" id="top"><rgb name="reflectance" value="0.5"/></bsdf>'
+GLASS = '<bsdf type="dielectric" id="glass"><float name="int_ior" value="1.5"/></bsdf>'
+BLOCK = f"""<shape type="cube" id="block"><transform name="to_world">
+    <scale x="0.1" y="2" z="3"/><translate x="{{x}}"/></transform>{MIRROR}</shape>"""
+
+
+@pytest.fixture
+def load(tmp_path):
+    if (problem := llvm_problem()) is not None:
+        pytest.skip(problem)
+
+    def load(shapes, *, variables=(DIM,), max_depth=5, direct="with_caustics", **arguments):
+        write_scene(tmp_path, shapes=shapes, variables=variables, max_depth=max_depth, fov=40)
+        arguments = {"backend": "llvm", "patch_size": 8, "buffer_samples": 4} | arguments
+        return MitsubaRenderer(scene=read_scene(tmp_path), direct=direct, **arguments)
+
+    return load
+
+
+def direct(renderer, v=None, resolution=RESOLUTION):
+    """[n, n, 3] linear radiance."""
+    v = torch.zeros(renderer.dimensions) if v is None else torch.tensor(v)
+    image = renderer.image_buffers(v, resolution=resolution)
+    return image[..., renderer.layout.slice("direct")].expm1().numpy()
+
+
+def of_a_bulb(at, normal=(0, 0, 1)):
+    """Radiance of the floor, lit by the bulb at a place."""
+    floor = on_plane(ORIGIN, rays(RESOLUTION, fov=40), np.zeros(3), normal)
+    away = np.asarray(at) - floor
+    cosine = dot(unit(away), np.asarray(normal))
+    return ALBEDO / np.pi * INTENSITY * cosine / dot(away, away)
+
+
+def assert_close(found, expected, *, mean, rms):
+    """mean, rms: relative errors allowed of the picture's mean, and of its pixels."""
+    assert found.mean() == pytest.approx(expected.mean(), rel=mean)
+    assert np.sqrt(np.square(found - expected).mean() / np.square(expected).mean()) < rms
+
+
+@pytest.mark.parametrize("degrees", [0, 30])
+def test_a_mirror_lights_the_floor_as_the_bulb_behind_it_would(load, degrees) -> None:
+    """Also where the floor is at an angle to the cells."""
+    floor = FLOOR.replace(
+        '<scale value="4"/>', f'<scale value="4"/><rotate y="1" angle="{degrees}"/>'
+    )
+    shapes = floor + BULB + rectangle("wall", WALL, MIRROR)
+    added = direct(load(shapes)) - direct(load(shapes, direct="traced"))
+    normal = [np.sin(np.radians(degrees)), 0, np.cos(np.radians(degrees))]
+    assert_close(added, REFLECTANCE * of_a_bulb(BULB_BEHIND, normal), mean=0.02, rms=0.15)
+
+
+def test_light_goes_through_a_pane(load) -> None:
+    """Straight on, as if there were none, but for what its two faces reflect to and fro."""
+    shapes = FLOOR + BULB + rectangle("pane", PANE, THIN)
+    floor = on_plane(ORIGIN, rays(RESOLUTION, fov=40), np.zeros(3), [0, 0, 1])
+    reflects = fresnel(unit(BULB_AT - floor)[..., 2:], 1.5)
+    passes = (1 - reflects) / (1 + reflects)
+    seen = load(shapes, specular="traced")
+    image = seen.image_buffers(torch.zeros(1), resolution=RESOLUTION)
+    throughput = image[..., seen.layout.slice("throughput")].numpy()
+    assert_close(direct(seen), throughput * passes * of_a_bulb(BULB_AT), mean=0.02, rms=0.15)
+
+
+def test_a_mirror_that_moves_and_grows_is_where_it_is(load, monkeypatch) -> None:
+    """A mesh that moves is an instance: as the same mesh that stands there, other photons."""
+    monkeypatch.setattr("ngi.render.caustics.PHOTONS", 2**16)
+    moves = "{object: block, property: translation, minimum: [0, 0, 0], maximum: [1, 0, 0]}"
+    grows = "{object: block, property: scale, minimum: 1, maximum: 1.5, pivot: [1.5, 0, 0]}"
+    plain = direct(load(FLOOR + BULB))
+    there = direct(load(FLOOR + BULB + BLOCK.format(x=2))) - plain
+    moved = direct(load(FLOOR + BULB + BLOCK.format(x=1.5), variables=[moves]), [0.5]) - plain
+    assert_close(moved, there, mean=0.03, rms=0.2)
+    large = BLOCK.format(x=1.5).replace('x="0.1" y="2" z="3"', 'x="0.15" y="3" z="4.5"')
+    expected = direct(load(FLOOR + BULB + large)) - plain
+    grown = direct(load(FLOOR + BULB + BLOCK.format(x=1.5), variables=[grows]), [1.0]) - plain
+    assert_close(grown, expected, mean=0.03, rms=0.2)
+    assert abs(expected - there).mean() > 0.1 * there.mean()
+
+
+def test_a_glass_sphere_focuses_what_mitsuba_says(load) -> None:
+    """The whole of the light in the sphere's shadow, and that it is a spot."""
+    ball = f'<shape type="sphere" id="ball"><point name="center" x="1" y="0.8" z="0.6"/>\
+<float name="radius" value="0.4"/>{GLASS}</shape>'
+    lamp = '<shape type="sphere" id="lamp"><point name="center" x="3" y="2.4" z="3"/>\
+<float name="radius" value="0.5"/><emitter type="area" id="bulb"><rgb name="radiance" \
+value="30, 20, 10"/></emitter></shape>'
+    vary = PAINT.replace("[0, 0, 0]", "[0.8, 0.5, 0.2]")
+    renderer = load(FLOOR + ball + lamp, variables=[vary], max_depth=8, buffer_samples=16)
+    plain = load(
+        FLOOR + ball + lamp, variables=[vary], max_depth=8, buffer_samples=16, direct="traced"
+    )
+    v = torch.zeros(3)
+    truth = renderer.render_image(v, resolution=48, samples_per_pixel=1024, seed=0).numpy()
+    added = direct(renderer, resolution=48) - direct(plain, resolution=48)
+    missing = truth - direct(plain, resolution=48)
+    shadow = slice(16, 26), slice(24, 34)  # about the shadow's centre, beside the sphere
+    assert missing[shadow].max() > 2 * truth.mean()
+    assert added[shadow].sum() == pytest.approx(missing[shadow].sum(), rel=0.1)
+    assert np.corrcoef(added[shadow].ravel(), missing[shadow].ravel())[0, 1] > 0.9
+
+
+def test_there_is_no_seed_and_patches_show_the_image(load) -> None:
+    turns = "{object: block, property: translation, minimum: [0, 0, 0], maximum: [1, 0, 0]}"
+    renderer = load(FLOOR + BULB + BLOCK.format(x=1.5), variables=[turns, DIM])
+    renderer.warm_up()
+    states = torch.rand(4, renderer.dimensions + 2, generator=torch.Generator().manual_seed(0))
+    with counted_compilations() as count:
+        first = renderer.render_patches(states, resolution=24, seed=1).buffers
+        second = renderer.render_patches(states.flip(0), resolution=24, seed=2).buffers.flip(0)
+    assert count == [0]
+    assert torch.equal(first, second)
+    for state, patch in zip(states, first, strict=True):
+        column, row = (min(int(p * 17), 16) for p in state[-2:].tolist())
+        image = renderer.image_buffers(state[:-2], resolution=24)
+        torch.testing.assert_close(
+            patch, image[row : row + 8, column : column + 8], atol=1e-5, rtol=0
+        )
+
+
+WITHOUT = {
+    "nothing is specular": (FLOOR + BULB, 5),
+    "paths are too short": (FLOOR + BULB + rectangle("wall", WALL, MIRROR), 2),
+}
+
+
+def test_few_photons_blur_but_lose_no_light(load, monkeypatch) -> None:
+    monkeypatch.setattr("ngi.render.caustics.PHOTONS", 2**8)
+    shapes = FLOOR + BULB + rectangle("wall", WALL, MIRROR)
+    added = direct(load(shapes)) - direct(load(shapes, direct="traced"))
+    assert_close(added, REFLECTANCE * of_a_bulb(BULB_BEHIND), mean=0.1, rms=0.3)
+
+
+@pytest.mark.parametrize("why", WITHOUT)
+def test_a_scene_without_caustics_has_its_direct_light(load, why) -> None:
+    shapes, max_depth = WITHOUT[why]
+    with_caustics, traced = (
+        direct(load(shapes, max_depth=max_depth, direct=choice))
+        for choice in ("with_caustics", "traced")
+    )
+    assert traced.max() > 0
+    np.testing.assert_array_equal(with_caustics, traced)
+
+
+def test_light_stays_on_the_side_of_the_surface_that_it_falls_on(load, tmp_path) -> None:
+    """A table reaches from the mirror over the floor: only its top is lit."""
+    table = rectangle("table", '<scale value="1.4"/><translate x="0.8" z="1.2"/>', TABLE)
+    load(FLOOR + BULB + table + rectangle("wall", WALL, MIRROR))
+    scene = VariableScene(read_scene(tmp_path))
+    options = {"needed_only": True, "trace_specular": False, "trace_direct": True}
+    caustics = first_hit_of(scene, trace_caustics=True, **options).caustics
+    pictures = caustics.pictures(scene.scene, photon_points())
+
+    def seen(start, direction):
+        ray = mi.Ray3f([0.8, 0, start], [0, 0, direction])
+        return caustics.radiance(pictures, scene.scene.ray_intersect(ray)).numpy()
+
+    away = BULB_BEHIND - [0.8, 0, 1.2]
+    expected = REFLECTANCE * 0.5 / np.pi * INTENSITY * unit(away)[2] / dot(away, away)
+    np.testing.assert_allclose(seen(2, -1)[:, 0], expected, rtol=0.25)
+    assert (seen(1, 1) == 0).all(), "the table from below"
+    assert (seen(1, -1) == 0).all(), "the floor under it"
+
+
+def test_python_is_too_slow_for_photons(load) -> None:
+    with pytest.raises(ValueError, match=r"use renderer\.direct=traced"):
+        load(FLOOR + BULB, backend="scalar")
