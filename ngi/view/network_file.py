@@ -113,7 +113,8 @@ BUFFERS = {
     "direct": "log(1 + x) of the pixel's mean direct light x, linear RGB: the radiance that leaves "
     "the surface towards the camera after one bounce from an emitter, times the throughput; "
     "trained on one emitter sample and one BSDF sample per camera ray, combined by multiple "
-    "importance sampling",
+    "importance sampling; with renderer.direct=with_caustics (method=ours) also what a diffuse "
+    "surface sends of the light that mirrors and glass throw onto it",
     "emission": "log(1 + x) of the mean emitted radiance x of the pixel, linear RGB",
 }
 """What the channels of `BufferLayout` are."""

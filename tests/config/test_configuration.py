@@ -111,8 +111,8 @@ METHODS = {  # sampler, resolution, model, what the renderer traces into the buf
     "cnsr": ("uniform", "constant", "cnsr", []),
     "anf": ("uniform", "constant", "anf", []),
     "traced_specular": ("mcmc_loss_step", "growing", PRECONDITIONED, ["specular"]),
-    "ours": ("sobol", "constant", "encoded_generator", ["specular", "direct"]),
-    "ours_uniform": ("uniform", "constant", "encoded_generator", ["specular", "direct"]),
+    "ours": ("sobol", "constant", "encoded_generator", ["specular", "direct and caustics"]),
+    "ours_uniform": ("uniform", "constant", "encoded_generator", ["specular", "direct and caustics"]),
     "traced_direct": ("mcmc_loss_step", "growing", PRECONDITIONED, ["direct"]),
 }
 PRIORITISED = {"_target_": "ngi.reuse.Prioritised", "alpha": 0.6, "beta": 0.4, "epsilon": 1e-6}
@@ -146,7 +146,9 @@ def test_path_tracing_takes_the_place_of_training_and_changes_nothing_else(metho
 def test_a_method_differs_where_its_name_says_and_nowhere_else(method: str) -> None:
     config = composed(f"method={method}", "budget=small")
     chosen = config.hydra.runtime.choices
-    traced = [name for name in ("specular", "direct") if config.renderer[name] == "traced"]
+    words = {"learned": "", "traced": "{}", "with_caustics": "{} and caustics"}
+    traced = [words[config.renderer[name]].format(name) for name in ("specular", "direct")]
+    traced = [name for name in traced if name]
     found = (chosen.sampler, chosen.resolution, chosen.model, traced)
     assert found == METHODS[method]
     assert config.label.method == method
@@ -259,6 +261,7 @@ CHANGED = {
     "camera_left_out": "data",
     "denoised_targets": "data",
     "direct_light": "renderer",
+    "caustics": "renderer",
     "specular_bounces": "renderer",
     "steady_reuse": "reuse",
     "large_images": "resolution",

@@ -32,7 +32,7 @@ def frames(scene: Scene, *, repeats: int, seconds: float) -> list[Figure]:
     The denoiser is given buffers for nothing: it needs those of the first hit without direct light,
     which take less than ours.
     """
-    renderer = MitsubaRenderer(scene=scene.read(), direct="traced", specular="traced")
+    renderer = MitsubaRenderer(scene=scene.read(), direct="with_caustics", specular="traced")
     network = OURS.network(
         layout=renderer.layout,
         scene_dimensions=renderer.dimensions,
