@@ -73,7 +73,7 @@ class JitTracer(Tracer):
             sample = index - pixel * view.samples
             jitter = dr.gather(mi.Point2f, points, sample)
             light_point = [dr.gather(mi.Float, numbers, sample) for numbers in light_points]
-            light = caustics.pictures(scene, photons) if caustics is not None else None
+            light = caustics.trace(scene, photons) if caustics is not None else None
             ray = view.rays(scene, pixel, jitter)
             channels = first_hit.channels(scene, ray, light_point, light)
             return _block_sums(channels, samples)

@@ -97,17 +97,7 @@ class SceneParameters(Parameters):
 
     def materials(self, object_id: str, bsdfs: Sequence[str]) -> Write:
         """A function that gives a shape, or all of an instance's, the BSDF of an index [1]."""
-        owner = self.object(self._group_of(object_id))
-        shapes = [
-            shape
-            for shape in self.objects(mi.Shape)
-            if self.belongs_to(shape, owner) and has_surface(shape)
-        ]
-        if not shapes:
-            raise ValueError(
-                f"{self._file}: '{object_id}' has no shape whose material could vary; name a "
-                "shape, a group or an instance"
-            )
+        shapes = self.dressed(object_id)
         choices = [self.object(name) for name in bsdfs]
         for name, choice in zip(bsdfs, choices, strict=True):
             if not isinstance(choice, mi.BSDF):
@@ -120,6 +110,21 @@ class SceneParameters(Parameters):
                 shape.set_bsdf(choices[int(index[0])])
 
         return write
+
+    def dressed(self, object_id: str) -> list[mi.Shape]:
+        """The shape, or all of a group's or an instance's, whose material can vary."""
+        owner = self.object(self._group_of(object_id))
+        shapes = [
+            shape
+            for shape in self.objects(mi.Shape)
+            if self.belongs_to(shape, owner) and has_surface(shape)
+        ]
+        if not shapes:
+            raise ValueError(
+                f"{self._file}: '{object_id}' has no shape whose material could vary; name a "
+                "shape, a group or an instance"
+            )
+        return shapes
 
     def _group_of(self, object_id: str) -> str:
         """The group that an instance shows, which is not a part of it; other ids as they are."""

@@ -82,18 +82,23 @@ class VariableScene:
 
     def bsdfs(self) -> list[mi.BSDF]:
         """Every BSDF that a ray can hit at some v."""
-        shapes = [shape for shape in self.shapes if has_surface(shape)]
+        bsdfs: list[mi.BSDF] = []
+        for shape in self.shapes:
+            for bsdf in self.bsdfs_of(shape) if has_surface(shape) else ():
+                if bsdf not in bsdfs:
+                    bsdfs.append(bsdf)
+        return bsdfs
+
+    def bsdfs_of(self, shape: mi.Shape) -> list[mi.BSDF]:
+        """Its own, and those that variables give it at some v."""
         chosen = [
             self._parameters.object(name)
             for variable in self.description.variables
             if isinstance(variable, Material)
+            and any(shape in self._parameters.dressed(dressed) for dressed in variable.objects)
             for name in variable.choices
         ]
-        bsdfs: list[mi.BSDF] = []
-        for bsdf in [shape.bsdf() for shape in shapes] + chosen:
-            if bsdf not in bsdfs:
-                bsdfs.append(bsdf)
-        return bsdfs
+        return [shape.bsdf(), *chosen]
 
     def placed(self) -> list[tuple[mi.Shape, mi.Shape | None]]:
         """Every shape that a ray can hit, with the instance that shows it, if any: as often as

@@ -95,6 +95,7 @@ PRECONDITIONED, PLAIN = "pixel_generator", "pixel_generator_no_preconditioning"
 COMPETITORS = ("cnsr", "anf")
 """Other methods, whose samples are of another size."""
 OURS = ("ours", "ours_uniform")
+LIGHT = ["specular", "direct and caustics"]
 METHODS = {  # sampler, resolution, model, what the renderer traces into the buffers
     "active_exploration": ("mcmc_loss_step", "growing", PRECONDITIONED, []),
     "uniform": ("uniform", "constant", PRECONDITIONED, []),
@@ -111,8 +112,8 @@ METHODS = {  # sampler, resolution, model, what the renderer traces into the buf
     "cnsr": ("uniform", "constant", "cnsr", []),
     "anf": ("uniform", "constant", "anf", []),
     "traced_specular": ("mcmc_loss_step", "growing", PRECONDITIONED, ["specular"]),
-    "ours": ("sobol", "constant", "encoded_generator", ["specular", "direct and caustics"]),
-    "ours_uniform": ("uniform", "constant", "encoded_generator", ["specular", "direct and caustics"]),
+    "ours": ("sobol", "constant", "encoded_generator", LIGHT),
+    "ours_uniform": ("uniform", "constant", "encoded_generator", LIGHT),
     "traced_direct": ("mcmc_loss_step", "growing", PRECONDITIONED, ["direct"]),
 }
 PRIORITISED = {"_target_": "ngi.reuse.Prioritised", "alpha": 0.6, "beta": 0.4, "epsilon": 1e-6}

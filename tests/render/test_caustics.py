@@ -110,6 +110,17 @@ def test_a_mirror_that_moves_and_grows_is_where_it_is(load, monkeypatch) -> None
     assert abs(expected - there).mean() > 0.1 * there.mean()
 
 
+def test_a_wall_is_a_mirror_where_a_variable_says_so(load) -> None:
+    dressed = "{object: wall, property: material, choices: [top, silver]}"
+    wall = rectangle("wall", WALL, '<ref id="top"/>')
+    varies = load(TABLE + MIRROR + FLOOR + BULB + wall, variables=[dressed])
+    fixed = load(FLOOR + BULB + rectangle("wall", WALL, MIRROR))
+    plain = load(FLOOR + BULB + rectangle("wall", WALL, TABLE))
+    np.testing.assert_array_equal(direct(varies, [1.0]), direct(fixed))
+    np.testing.assert_array_equal(direct(varies, [0.0]), direct(plain))
+    assert direct(fixed).mean() > 1.1 * direct(plain).mean()
+
+
 def test_a_glass_sphere_focuses_what_mitsuba_says(load) -> None:
     """The whole of the light in the sphere's shadow, and that it is a spot."""
     ball = f'<shape type="sphere" id="ball"><point name="center" x="1" y="0.8" z="0.6"/>\
@@ -181,11 +192,11 @@ def test_light_stays_on_the_side_of_the_surface_that_it_falls_on(load, tmp_path)
     scene = VariableScene(read_scene(tmp_path))
     options = {"needed_only": True, "trace_specular": False, "trace_direct": True}
     caustics = first_hit_of(scene, trace_caustics=True, **options).caustics
-    pictures = caustics.pictures(scene.scene, photon_points())
+    traced = caustics.trace(scene.scene, photon_points())
 
     def seen(start, direction):
         ray = mi.Ray3f([0.8, 0, start], [0, 0, direction])
-        return caustics.radiance(pictures, scene.scene.ray_intersect(ray)).numpy()
+        return caustics.radiance(traced, scene.scene.ray_intersect(ray)).numpy()
 
     away = BULB_BEHIND - [0.8, 0, 1.2]
     expected = REFLECTANCE * 0.5 / np.pi * INTENSITY * unit(away)[2] / dot(away, away)

@@ -1,0 +1,166 @@
+"""Irradiance from photons, in six pictures of a scene's bounds (photon mapping, Jensen 1996).
+
+There is one picture for each direction that a surface can mainly face. Where few photons arrive,
+wider cells count. The sums over photons are sums of integers: in any order the same.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ngi.machine.backend import dr, mi
+
+CELLS = 128
+"""Of a picture's finest level, along the longest side of the bounds."""
+
+LEVELS = 5
+"""Each has cells twice as wide as the one before."""
+
+ENOUGH_PHOTONS = 16
+"""In a cell and its neighbours, for its own irradiance to count and not that of coarser cells: as
+many of equal power as have the same relative variance.
+"""
+
+TOLERANCE = 8
+"""Cells between a surface and the light of its picture, beyond which it is another surface's."""
+
+_RESOLUTION = 2.0**-20
+"""Of the sums over photons."""
+
+_BRIGHTEST = 1e4
+"""Irradiance that one photon adds at most."""
+
+
+@dataclass(frozen=True)
+class IrradiancePictures:
+    """Makes and reads the pictures; a picture's number, columns and rows count in cells.
+
+    bounds: the scene's corners with the least and the greatest coordinates.
+    """
+
+    bounds: tuple[tuple[float, ...], tuple[float, ...]]
+
+    def of_photons(self, hit: mi.SurfaceInteraction3f, power: mi.Color3f) -> mi.Float:
+        """[6 * CELLS * CELLS * 4] irradiance in R, G and B, and depth in cells.
+
+        hit: where each photon arrives. power: 0 for those that do not count.
+        """
+        picture, x, y, depth = self._place(hit)
+        column, row = mi.Int32(dr.floor(x)), mi.Int32(dr.floor(y))
+        active = (dr.max(power) > 0) & _inside(column, row)
+        index = mi.UInt32((picture * CELLS + row) * CELLS + column)
+        light = dr.minimum(power / self._cell**2, _BRIGHTEST)
+        mean = dr.mean(light)
+        values = (*light, dr.square(mean), mean * depth)
+        sums = [dr.zeros(mi.UInt64, 6 * CELLS * CELLS) for _ in values]
+        for total, value in zip(sums, values, strict=True):
+            number = mi.Int64(dr.round(value / _RESOLUTION))
+            dr.scatter_add(total, mi.UInt64(number), index, active)  # CUDA adds none with a sign
+        dr.eval(sums)
+        return _resolved([mi.Float(mi.Int64(total)) * _RESOLUTION for total in sums])
+
+    def irradiance(self, pictures: mi.Float, hit: mi.SurfaceInteraction3f) -> mi.Color3f:
+        """On the side of the surface that the ray has met."""
+        picture, x, y, depth = self._place(hit)
+        light = mi.Color3f(0)
+        for column, row, weight in _bilinear(x, y):
+            index = mi.UInt32((picture * CELLS + row) * CELLS + column)
+            here = hit.is_valid() & _inside(column, row)
+            value = dr.gather(mi.Vector4f, pictures, index, here)
+            near = dr.abs(value.w - depth) < TOLERANCE
+            light += dr.select(near, weight * mi.Color3f(value.x, value.y, value.z), 0)
+        return light * dr.max(dr.abs(hit.n))  # a cell holds more of a surface at an angle to it
+
+    @property
+    def _cell(self) -> float:
+        """Width."""
+        low, high = map(np.array, self.bounds)
+        return float((high - low).max() / CELLS)
+
+    def _place(self, hit: mi.SurfaceInteraction3f) -> tuple[mi.Int32, mi.Float, mi.Float, mi.Float]:
+        """Number of the picture, and column, row and depth there."""
+        x, y, z = (hit.p - mi.Point3f(*self.bounds[0])) / self._cell
+        normal = dr.mulsign(mi.Normal3f(hit.n), dr.dot(hit.n, hit.to_world(hit.wi)))
+        steep = dr.abs(normal)
+        along_x = (steep.x >= steep.y) & (steep.x >= steep.z)
+        along_y = ~along_x & (steep.y >= steep.z)
+        axis = dr.select(along_x, mi.Int32(0), dr.select(along_y, 1, 2))
+        main = dr.select(along_x, normal.x, dr.select(along_y, normal.y, normal.z))
+        return (
+            2 * axis + dr.select(main > 0, mi.Int32(1), 0),
+            dr.select(along_x, y, x),
+            dr.select(along_x | along_y, z, y),
+            dr.select(along_x, x, dr.select(along_y, y, z)),
+        )
+
+
+def _resolved(sums: list[mi.Float]) -> mi.Float:
+    """Of each cell the finest level at which enough photons have arrived, blended with the next.
+
+    sums: irradiance in R, G and B; of its mean over them the sum of squares, and times the depth.
+    """
+    levels = [sums]
+    for level in range(1, LEVELS):
+        levels.append(_coarser(levels[-1], level))
+    index, picture, row, column = _cells(CELLS)
+    light, depth, photons = mi.Color3f(0), mi.Float(-2 * CELLS), mi.Float(0)
+    for level in reversed(range(LEVELS)):
+        *total, squares, deep = _interpolated(levels[level], picture, column, row, level)
+        mean = dr.mean(mi.Color3f(total))
+        # What is expected of this level: chosen by what it has, too much light would be found.
+        enough = 1 if level == LEVELS - 1 else dr.clip(2 * photons / ENOUGH_PHOTONS - 1, 0, 1)
+        photons = dr.square(mean) / dr.maximum(squares, _RESOLUTION)  # as in four finer cells
+        light = dr.lerp(light, mi.Color3f(total) / 4**level, enough)
+        depth = dr.select(mean > 0, deep / mean, depth)
+    packed = dr.zeros(mi.Float, 4 * 6 * CELLS * CELLS)
+    dr.scatter(packed, mi.Vector4f(*light, depth), index)
+    return packed
+
+
+def _coarser(finer: list[mi.Float], level: int) -> list[mi.Float]:
+    """Sums over the four cells of the finer level that are one of this level's."""
+    cells = CELLS >> level
+    _, picture, row, column = _cells(cells)
+    first = (picture * cells * 2 + row * 2) * cells * 2 + column * 2
+    corners = (first, first + 1, first + cells * 2, first + cells * 2 + 1)
+    sums = [sum(dr.gather(mi.Float, total, corner) for corner in corners) for total in finer]
+    dr.eval(sums)
+    return sums
+
+
+def _cells(count: int) -> tuple[mi.UInt32, mi.UInt32, mi.UInt32, mi.UInt32]:
+    """Index, picture, row and column of every cell; count: of columns."""
+    index = dr.arange(mi.UInt32, 6 * count * count)
+    return index, index // (count * count), index // count % count, index % count
+
+
+def _interpolated(
+    totals: list[mi.Float], picture: mi.UInt32, column: mi.UInt32, row: mi.UInt32, level: int
+) -> list[mi.Float]:
+    """Between a level's cells, at the centres of those of the finest level."""
+    cells = CELLS >> level
+    x, y = ((mi.Float(place) + 0.5) / 2**level for place in (column, row))
+    result = [mi.Float(0) for _ in totals]
+    for i, j, weight in _bilinear(x, y):
+        i, j = (dr.clip(place, 0, cells - 1) for place in (i, j))
+        index = mi.UInt32((mi.Int32(picture) * cells + j) * cells + i)
+        for k, total in enumerate(totals):
+            result[k] = result[k] + weight * dr.gather(mi.Float, total, index)
+    return result
+
+
+def _bilinear(x: mi.Float, y: mi.Float) -> list[tuple[mi.Int32, mi.Int32, mi.Float]]:
+    """Column, row and weight of the four cells whose centres surround a place."""
+    left, top = dr.floor(x - 0.5), dr.floor(y - 0.5)
+    to_right, down = x - 0.5 - left, y - 0.5 - top
+    return [
+        (mi.Int32(left) + i, mi.Int32(top) + j, across * along)
+        for i, across in ((0, 1 - to_right), (1, to_right))
+        for j, along in ((0, 1 - down), (1, down))
+    ]
+
+
+def _inside(column: mi.Int32, row: mi.Int32) -> mi.Bool:
+    return (column >= 0) & (column < CELLS) & (row >= 0) & (row < CELLS)
