@@ -7,7 +7,7 @@ SWEEPS := same_time preconditioning resolution target_function acceptance histog
 BUDGET ?= small
 OPTIONS ?=
 SCENE ?= living-room
-.PHONY: help setup demo view test report docs lint smoke benchmark gpu doctor clean
+.PHONY: help setup demo view test report docs lint smoke browser benchmark gpu doctor clean
 
 help: ## list the commands
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 14
@@ -25,8 +25,8 @@ demo: setup ## train ours, the paper's method and uniform sampling, compare them
 view: setup ## trained networks in the browser: SCENE=living-room|sphere-caustic|veach-egg
 	@$(BIN)/ngi view run=scenes/$(SCENE)/network
 
-test: setup lint smoke ## linter, type checker, all tests, smoke run on real renders
-	@sh tools/browser.sh
+test: setup ## linter, type checker, all tests, smoke run on real renders
+	@$(MAKE) --no-print-directory --jobs=3 lint smoke browser
 	@OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n auto --maxprocesses 4 --dist loadfile
 
 lint: setup
@@ -39,6 +39,9 @@ smoke: setup
 	@$(BIN)/python -m ngi.train -m +sweeps=smoke
 	@$(BIN)/python -m ngi.train -m +sweeps=acceptance budget=smoke seed=0
 	@$(BIN)/python -m analysis.report outputs/smoke
+
+browser:
+	@sh tools/browser.sh
 
 report: setup ## all sweeps at BUDGET=smoke|small|paper: runs what is missing, builds the report
 	@failed=0; for sweep in $(SWEEPS); do \

@@ -223,6 +223,9 @@ def test_tests_mirror_the_program() -> None:
 
 
 def test_help_does_not_wait_for_pytorch() -> None:
-    code = "import sys, ngi.train; print([m for m in ('torch', 'mitsuba') if m in sys.modules])"
+    code = (
+        "import sys, ngi.train; "
+        "print([m for m in ('torch', 'mitsuba', 'scipy') if m in sys.modules])"
+    )
     answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT)
     assert answer.stdout.strip() == "[]", answer.stderr

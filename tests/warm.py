@@ -8,6 +8,7 @@ import atexit
 import multiprocessing
 import os
 import runpy
+import signal
 import sys
 import threading
 from collections.abc import Callable, Mapping
@@ -78,6 +79,9 @@ def _module(
         if place in sys.path:
             sys.path.remove(place)
         sys.path.insert(0, place)
+    signal.signal(
+        signal.SIGINT, signal.default_int_handler
+    )  # ignored in the background of a script
     sys.argv = [module, *words]
     sys.modules.pop(module, None)  # it would be said to be there before it runs
     try:

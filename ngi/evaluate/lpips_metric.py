@@ -2,12 +2,14 @@
 
 import pickle
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
+from zipfile import is_zipfile
 
 import torch
 from torch import Tensor, nn
+from torch.overrides import TorchFunctionMode
 
 from ngi.machine.torchvision_operators import ensure_torchvision_operators
 
@@ -65,8 +67,8 @@ def _how_to_get_weights(path: Path) -> str:
 
 def _convolutions(path: Path) -> dict[str, Tensor]:
     """AlexNet's convolution weights and biases, by their names in torchvision ('0.weight', …)."""
-    try:
-        state: Any = torch.load(path, map_location="cpu", weights_only=True)
+    try:  # mapped: of the whole state dict's 233 MB ten are used
+        state: Any = torch.load(path, map_location="cpu", weights_only=True, mmap=is_zipfile(path))
     except FileNotFoundError as error:
         raise ValueError(f"LPIPS weights {path}: there is no such file") from error
     except (OSError, RuntimeError, EOFError, pickle.UnpicklingError) as error:
@@ -85,11 +87,27 @@ def _convolutions(path: Path) -> dict[str, Tensor]:
     return found
 
 
+class _Undrawn(TorchFunctionMode):
+    """Layers made under it have memory for weights, and no weights in it yet."""
+
+    def __torch_function__(
+        self,
+        func: Callable[..., Any],
+        types: Any,
+        args: tuple[Any, ...] = (),
+        kwargs: dict[str, Any] | None = None,
+    ) -> Any:
+        given = kwargs or {}
+        drawing = func in (nn.init.kaiming_uniform_, nn.init.uniform_)
+        return given["tensor"] if drawing else func(*args, **given)
+
+
 def _network(convolutions: dict[str, Tensor]) -> nn.Module:
     """The package's network with its own linear layers and the given AlexNet features."""
     ensure_torchvision_operators()
-    # The package builds a random AlexNet first, and by a way torchvision calls deprecated.
-    with torch.random.fork_rng(devices=[]), warnings.catch_warnings():
+    # The package builds all of AlexNet first, of which 58 million random weights would be left
+    # unused after a third of a second, and by a way torchvision calls deprecated.
+    with _Undrawn(), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         import lpips
 

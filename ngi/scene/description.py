@@ -6,7 +6,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import qmc
 
 from ngi.scene.kinds import CameraPath, FieldOfView, LookAt, Material
 from ngi.scene.scene_files import SceneFile
@@ -152,5 +151,7 @@ HARD_FRAMES, PATH_FRAMES = 10, 6
 
 def spread_frames(count: int, dimensions: int) -> tuple[Vector, ...]:
     """Points of v spread evenly over the hypercube: a Halton sequence, always the same."""
+    from scipy.stats import qmc  # half a second that scenes which name their frames need not wait
+
     points = qmc.Halton(dimensions, seed=2022).random(count)
     return tuple(tuple(point) for point in points.round(4).tolist())

@@ -90,16 +90,22 @@ def scenes() -> dict[str, dict[str, Any]]:
     """
     options: dict[str, dict[str, Any]] = {}
     for name, folder in scene_folders().items():
-        try:
-            top = YamlKeys(folder / "scene.yaml", "", load_yaml(folder / "scene.yaml"))
-            variants = top.integers("variants") if "variants" in top else []
-        except ValueError:
-            variants = []
-        counts: list[int | None] = [*variants] if variants else [None]
+        counts: list[int | None] = [*_variants(folder / "scene.yaml")] or [None]
         for count in counts:
             option = name if count is None else f"{name}-{count}"
             options[option] = {"folder": str(folder), "dimensions": count}
     return options
+
+
+def _variants(path: Path) -> list[int]:
+    """Read only where the word is there: every command asks this of every scene."""
+    if b"variants" not in path.read_bytes():
+        return []
+    try:
+        top = YamlKeys(path, "", load_yaml(path))
+        return top.integers("variants") if "variants" in top else []
+    except ValueError:
+        return []
 
 
 def _first(scene: SceneDescription, dimensions: int, path: Path) -> SceneDescription:

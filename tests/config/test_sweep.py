@@ -3,15 +3,13 @@
 import json
 import re
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from ngi.config.sweep import progress
 from ngi.config.sweep_plan import Planned, duration, table
-from tests.learn.command_line import SIZE, SMALL, environment, run
+from tests.learn.command_line import SIZE, SMALL, run, run_module
 
 PLACE = (
     "run.folder='outputs/steps/${optimizer.lr}-${seed}'"  # names of their own would be long and cut
@@ -160,19 +158,12 @@ ngi.train.main()
 def test_a_bug_in_the_plan_of_a_dry_run_trains_nothing(
     tmp_path: Path, multirun: tuple[str, ...]
 ) -> None:
-    ran = subprocess.run(
-        [sys.executable, "-c", BROKEN, *multirun, "--dry-run", *SMALL, PLACE],
-        cwd=tmp_path,
-        env=environment(tmp_path),
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
-    assert ran.returncode == 1, ran.stderr
-    assert "a bug of the plan" in ran.stderr
-    assert "this is a bug; nothing was trained" in ran.stderr
-    assert "Launching" not in ran.stdout
+    (tmp_path / "broken.py").write_text(BROKEN)
+    status, output = run_module("broken", *multirun, "--dry-run", *SMALL, PLACE, folder=tmp_path)
+    assert status == 1, output
+    assert "a bug of the plan" in output
+    assert "this is a bug; nothing was trained" in output
+    assert "Launching" not in output
     assert not (tmp_path / "outputs").exists()
 
 

@@ -4,6 +4,7 @@ import json
 import os
 import re
 import runpy
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 
 from tests.docs.pages import LONG, ROOT, blocks
 from tests.learn.command_line import environment
+from tests.warm import finish, start_module
 
 TUTORIALS = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
 
@@ -36,6 +38,26 @@ def run(command: list[str], *, cwd: Path, env: dict[str, str]) -> None:
         command, cwd=cwd, env=env, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     )
     assert answer.returncode == 0, f"{command[-1]}\n{answer.stdout}"
+
+
+def follow(text: str, *, cwd: Path, env: dict[str, str]) -> None:
+    """Line by line; training begins in a process that need not import everything first."""
+    for line in filter(None, text.splitlines()):
+        training = re.fullmatch(r"(?:PYTHONPATH=(\S+) )?ngi (train .*)", line)
+        if training is None:
+            run(["bash", "-e", "-c", line], cwd=cwd, env=env)
+            continue
+        path = os.pathsep.join([training[1] or env["PYTHONPATH"], str(ROOT)])
+        output = cwd.parent / "output"
+        started = start_module(
+            "ngi",
+            *shlex.split(training[2], comments=True),
+            folder=cwd,
+            environment={**env, "PYTHONPATH": path},
+            output=output,
+        )
+        status, printed = finish(started, output, seconds=300)
+        assert status == 0, f"{line}\n{printed}"
 
 
 def composed_only(text: str) -> str:
@@ -71,7 +93,7 @@ def test_a_tutorial_works_as_it_stands_there(page: Path, tmp_path: Path) -> None
             file.write_text(block.text)
         elif block.language == "sh":
             text = composed_only(block.text) if block.title == LONG else block.text
-            run(["bash", "-e", "-c", text], cwd=place, env=environment)
+            follow(text, cwd=place, env=environment)
         elif block.language == "python":
             script += block.text
     notebook = page.with_suffix(".ipynb")

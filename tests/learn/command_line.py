@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import tempfile
+from multiprocessing.context import ForkServerProcess
 from pathlib import Path
 
 import ngi
@@ -40,31 +41,45 @@ def environment(folder: Path) -> dict[str, str]:
 
 
 def start(
-    folder: Path, *overrides: str, options: tuple[str, ...] = (), base: tuple[str, ...] = SMALL
-) -> "subprocess.Popen[str]":
-    """options: of Hydra, such as --multirun. base: overrides that come before `overrides`."""
-    return subprocess.Popen(
-        [sys.executable, "-m", "ngi.train", *options, *base, *overrides],
-        cwd=folder,
-        env=environment(folder),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
+    folder: Path,
+    *overrides: str,
+    output: Path,
+    options: tuple[str, ...] = (),
+    base: tuple[str, ...] = SMALL,
+) -> ForkServerProcess:
+    """A process that need not import everything first, and prints into `output`.
+
+    options: of Hydra, such as --multirun. base: overrides that come before `overrides`.
+    """
+    return warm.start_module(
+        "ngi.train",
+        *(*options, *base, *overrides),
+        folder=folder,
+        environment=environment(folder),
+        output=output,
     )
 
 
 def run(
     folder: Path, *overrides: str, options: tuple[str, ...] = (), base: tuple[str, ...] = SMALL
 ) -> tuple[int, str]:
-    """Exit status and everything printed, by a process that need not import everything first."""
+    """The same, until it has ended: exit status and everything printed."""
     return run_module("ngi.train", *options, *base, *overrides, folder=folder)
 
 
 def run_cold(folder: Path, *overrides: str, options: tuple[str, ...] = ()) -> tuple[int, str]:
     """The same by a process of its own, as launchers need it, whose processes have it as parent."""
-    process = start(folder, *overrides, options=options)
-    output, _ = process.communicate(timeout=300)
-    return process.returncode, output
+    ended = subprocess.run(
+        [sys.executable, "-m", "ngi.train", *options, *SMALL, *overrides],
+        cwd=folder,
+        env=environment(folder),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    return ended.returncode, ended.stdout
 
 
 def run_module(module: str, *words: str, folder: Path) -> tuple[int, str]:

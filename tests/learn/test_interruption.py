@@ -1,5 +1,6 @@
 """SIGTERM and Ctrl-C end a run soon, and without a step lost."""
 
+import os
 import pickle
 import random
 import signal
@@ -16,10 +17,11 @@ import torch
 
 from ngi.learn import IlluminationModule, Interrupted, Interruption
 from ngi.render import AnalyticRenderer
-from tests.learn.command_line import SMALL, start
+from tests.learn.command_line import start
 from tests.learn.comparison import assert_same_run
 from tests.learn.forked import configuration, run
 from tests.learn.forked import start as start_forked
+from tests.warm import finish
 
 OFTEN = "evaluation.count=20"
 """Most of the time of these runs is evaluation."""
@@ -131,16 +133,17 @@ def test_sigterm_in_the_middle_of_anything(
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
 def test_a_signal_ends_the_whole_sweep(tmp_path: Path, number: signal.Signals, status: int) -> None:
     endless = ("budget.steps=100000", "run.checkpoint_steps=7", "seed=0,1")
-    process = start(tmp_path, *endless, options=("--multirun",), base=SMALL)
+    log = tmp_path / "output"
+    process = start(tmp_path, *endless, output=log, options=("--multirun",))
     try:
         while not (found := [*tmp_path.rglob("last.ckpt")]):
-            assert process.poll() is None, process.communicate()[0]
+            assert process.is_alive(), log.read_text()
             time.sleep(0.01)
-        process.send_signal(number)
-        output = process.communicate(timeout=30)[0]
+        os.kill(process.pid, number)
+        found_status, output = finish(process, log, seconds=30)
     finally:
         process.kill()
-    assert process.returncode == status, output
+    assert found_status == status, output
     assert f"ended by {number.name}; the same command goes on" in output
     assert "interrupted, and saved at step" in output
     assert_no_step_is_lost(found[0].parent)

@@ -22,14 +22,15 @@ def unbroken(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def kill_after_checkpoint(folder: Path, *options: str) -> None:
-    process = start(folder, *options, base=())
+    output = folder / "output"
+    process = start(folder, *options, output=output, base=())
     deadline = time.monotonic() + 120
     while not (folder / "run" / "last.ckpt").exists():
-        assert process.poll() is None, process.communicate()[0]
+        assert process.is_alive(), output.read_text()
         assert time.monotonic() < deadline
         time.sleep(0.005)
     process.kill()
-    process.communicate()
+    process.join()
 
 
 def test_real_renders_with_growing_resolution_resume_bit_for_bit(tmp_path: Path) -> None:

@@ -15,8 +15,9 @@ from ngi.models import L1Dssim, PixelGenerator
 from ngi.patches import Patches
 from ngi.render import AnalyticRenderer
 from tests.files.test_record_log import read
-from tests.learn.command_line import SMALL, start
+from tests.learn.command_line import start
 from tests.learn.comparison import assert_same
+from tests.warm import finish
 
 CELLS, POSITIONS = 3, 2
 
@@ -107,13 +108,13 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
             "renderer.dimensions=2",
             f"run.folder={name}",
             f"evaluation.target_map={value}",
-            base=SMALL,
+            output=folder / f"{name}.log",
         )
         for name, value in (("without", "null"), ("with", node))
     }
-    for process in processes.values():
-        output, _ = process.communicate(timeout=300)
-        assert process.returncode == 0, output
+    for name, process in processes.items():
+        status, output = finish(process, folder / f"{name}.log", seconds=300)
+        assert status == 0, output
     return {name: folder / name for name in processes}
 
 

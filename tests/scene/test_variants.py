@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from ngi.scene import read_scene, scenes
+from ngi.scene.yaml_keys import load_yaml
 
 BOX = Path(__file__).parents[1] / "render" / "scenes" / "box"
 
@@ -79,3 +80,17 @@ def test_scenes_are_known_by_name_and_variant(box, tmp_path, monkeypatch) -> Non
 
 def test_shipped_scenes_are_known_by_name() -> None:
     assert {"sphere-caustic", "mirror"} <= scenes().keys()
+
+
+def test_only_scenes_with_variants_are_read_for_their_names(box, tmp_path, monkeypatch) -> None:
+    box([3, 10], "several")
+    shutil.copytree(BOX, tmp_path / "single")
+    monkeypatch.setattr(
+        "ngi.scene.folder.scene_folders", lambda: {p.name: p for p in [*tmp_path.iterdir()]}
+    )
+    read = []
+    monkeypatch.setattr(
+        "ngi.scene.folder.load_yaml", lambda path: read.append(path) or load_yaml(path)
+    )
+    assert scenes().keys() == {"several-3", "several-10", "single"}
+    assert read == [tmp_path / "several" / "scene.yaml"]

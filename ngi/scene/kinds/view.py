@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from ngi.scene import transforms
 from ngi.scene.variable import LoadedScene, RangedVariable, Values, Variable, Write
@@ -64,6 +63,8 @@ class CameraPath(Variable):
 
     def value(self, components: Values) -> Values:
         """[6]: the view there."""
+        from scipy.interpolate import CubicSpline  # a quarter of a second, for few scenes
+
         places = np.linspace(0, 1, len(self.keys))
         view: Values = CubicSpline(places, np.array(self.keys))(components[0])
         return view
