@@ -63,11 +63,9 @@ class FirstHit:
             if self.chain is not None:
                 direct = dr.select(self.chain.lit(end.segments), end.throughput * direct, 0)
             traced["direct"] = list(direct)
-        low, high = map(np.array, self.bounds)
-        extent = high - low
         albedo, roughness = evaluate_materials(self.materials, hit, valid)
         buffers = {
-            "position": (hit.p - mi.Vector3f(*low.tolist())) / mi.Vector3f(*extent.tolist()),
+            "position": self._normalised(hit.p),
             "normal": hit.sh_frame.n * 0.5 + 0.5,
             "outgoing": -ray.d,
             "albedo": albedo,
@@ -82,6 +80,11 @@ class FirstHit:
             else:
                 channels += [dr.select(valid, c, mi.Float(0)) for c in buffers[name]]
         return channels
+
+    def _normalised(self, position: mi.Point3f) -> mi.Vector3f:
+        """Within the bounds."""
+        low, high = map(np.array, self.bounds)
+        return (position - mi.Vector3f(*low.tolist())) / mi.Vector3f(*(high - low).tolist())
 
 
 def first_hit_of(
