@@ -9,6 +9,8 @@ from typing import Any, NoReturn, TypeVar, cast
 
 from pydantic import TypeAdapter, ValidationError
 
+from ngi.machine.memory import keep_freed_memory
+
 Options = TypeVar("Options")
 
 
@@ -80,6 +82,7 @@ def run_tool(
     is printed; 130 after Ctrl-C.
     """
     options = read_options(kind, program, sys.argv[1:] if arguments is None else arguments)
+    keep_freed_memory()
     try:
         status = work(options)
     except (ValueError, OSError, RuntimeError) as error:

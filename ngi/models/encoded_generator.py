@@ -5,6 +5,7 @@ from torch import Tensor, nn
 
 from ngi.models.generator_inputs import check_inputs, check_sizes
 from ngi.models.known_light import add_known_light
+from ngi.models.parallel import in_parallel
 from ngi.models.pixel_encoding import PixelEncoding
 from ngi.models.pixel_generator import CACHED_PIXELS, MANY_PIXELS, RADIANCE_CHANNELS
 from ngi.models.pixel_mlp import PixelMLP
@@ -67,7 +68,8 @@ class EncodedGenerator(nn.Module):
         check_inputs(
             buffers, scene_vector, layout=self.layout, scene_dimensions=self.scene_dimensions
         )
-        output = self._output(buffers.flatten(1, 2), scene_vector).unflatten(1, buffers.shape[1:3])
+        output = self._output(buffers.flatten(1, 2), scene_vector, _precision(buffers))
+        output = output.unflatten(1, buffers.shape[1:3])
         return add_known_light(output, buffers, self.layout)
 
     @torch.no_grad()
@@ -79,17 +81,28 @@ class EncodedGenerator(nn.Module):
             layout=self.layout,
             scene_dimensions=self.scene_dimensions,
         )
-        size = CACHED_PIXELS if buffers.device.type == "cpu" else MANY_PIXELS
-        chunks = buffers.flatten(0, 1).split(size)
-        output = torch.cat([self._output(chunk[None], scene_vector[None])[0] for chunk in chunks])
+        precision = _precision(buffers)
+
+        def output_of(chunk: Tensor) -> Tensor:
+            return self._output(chunk[None], scene_vector[None], precision)[0]
+
+        pixels = buffers.flatten(0, 1)
+        if buffers.device.type == "cpu":
+            output = torch.cat(in_parallel(output_of, pixels.split(CACHED_PIXELS)))
+        else:
+            output = torch.cat([output_of(chunk) for chunk in pixels.split(MANY_PIXELS)])
         return add_known_light(output.unflatten(0, buffers.shape[:2]), buffers, self.layout)
 
-    def _output(self, pixels: Tensor, scene_vector: Tensor) -> Tensor:
+    def _output(self, pixels: Tensor, scene_vector: Tensor, precision: torch.dtype) -> Tensor:
         """Of the last layer: [n, p, C] and [n, D] to [n, p, 3]."""
-        device = pixels.device.type
-        precision = pixels.dtype
-        if torch.is_autocast_enabled(device) and precision == torch.float32:
-            precision = torch.get_autocast_dtype(device)
-        with torch.autocast(device, enabled=False):
+        with torch.autocast(pixels.device.type, enabled=False):
             output: Tensor = self.mlp(self.encoding(pixels, scene_vector, precision), scene_vector)
         return output.to(pixels.dtype)
+
+
+def _precision(pixels: Tensor) -> torch.dtype:
+    """Of the products: autocast's where it is on."""
+    device = pixels.device.type
+    if torch.is_autocast_enabled(device) and pixels.dtype == torch.float32:
+        return torch.get_autocast_dtype(device)
+    return pixels.dtype

@@ -18,7 +18,7 @@ from torch import Tensor
 
 from ngi.machine.backend import dr, mi
 from ngi.machine.hand_over import stacked
-from ngi.render.caustics import photon_points
+from ngi.render.caustics import Caustics, photon_points
 from ngi.render.direct_light import light_points
 from ngi.render.first_hit import FirstHit
 from ngi.render.fitting import does_not_fit
@@ -38,12 +38,14 @@ class JitTracer(Tracer):
     Of each size of window and number of samples the kernel launches are recorded once and then
     replayed: tracing the Python code takes up to a fifth of a second in a scene of many materials,
     whatever the size.
+
+    changes: a number that is another one whenever the scene differs in more than the camera
     """
 
-    def __init__(self, *, scene: mi.Scene, first_hit: FirstHit) -> None:
+    def __init__(self, *, scene: mi.Scene, first_hit: FirstHit, changes: Callable[[], int]) -> None:
         self._scene = scene
         caustics = first_hit.caustics
-        self._photons = photon_points() if caustics is not None else []
+        self._light = None if caustics is None else _PhotonLight(scene, caustics, changes)
         self._points: dict[int, tuple[mi.Point2f, list[mi.Float]]] = {}
         # Plain functions, not methods: a frozen function follows the arrays of its arguments only,
         # and holds what is constant for this tracer in its closure.
@@ -64,7 +66,7 @@ class JitTracer(Tracer):
             view: _View,
             points: mi.Point2f,
             light_points: list[mi.Float],
-            photons: list[mi.Float],
+            light: list[mi.Float],
             samples: int,
             rays: int,
         ) -> list[mi.Float]:
@@ -73,9 +75,8 @@ class JitTracer(Tracer):
             sample = index - pixel * view.samples
             jitter = dr.gather(mi.Point2f, points, sample)
             light_point = [dr.gather(mi.Float, numbers, sample) for numbers in light_points]
-            light = caustics.trace(scene, photons) if caustics is not None else None
             ray = view.rays(scene, pixel, jitter)
-            channels = first_hit.channels(scene, ray, light_point, light)
+            channels = first_hit.channels(scene, ray, light_point, *light)
             return _block_sums(channels, samples)
 
         self._radiance = _replayed(trace_radiance)
@@ -97,7 +98,8 @@ class JitTracer(Tracer):
         view = _View.of(window, samples)
         rays = window.width * window.height * samples
         points = self._points[samples]
-        sums = self._buffers(self._scene, view, *points, self._photons, samples, rays)
+        light = [] if self._light is None else self._light.now()
+        sums = self._buffers(self._scene, view, *points, light, samples, rays)
         return _pending(sums, window, samples)
 
     def _prepare(self, window: Window) -> None:
@@ -115,6 +117,31 @@ class JitTracer(Tracer):
         view, seed = _View.of(window, 1), dr.opaque(mi.UInt32, 0)
         dr.eval(self._trace_radiance(self._scene, view, seed, 1, pixels))
         self._ready = True
+
+
+class _PhotonLight:
+    """What photons leave in the scene, traced once while nothing but the camera moves.
+
+    changes: see `JitTracer`
+    """
+
+    def __init__(self, scene: mi.Scene, caustics: Caustics, changes: Callable[[], int]) -> None:
+        def trace_photons(scene: mi.Scene, photons: list[mi.Float]) -> list[mi.Float]:
+            light = caustics.trace(scene, photons)
+            dr.eval(light)
+            return [light]
+
+        self._scene, self._photons, self._changes = scene, photon_points(), changes
+        self._trace = _replayed(trace_photons)
+        self._light: list[mi.Float] = []
+        self._light_of = -1
+
+    def now(self) -> list[mi.Float]:
+        """As `FirstHit.channels` takes it."""
+        if self._light_of != (changes := self._changes()):
+            self._light = self._trace(self._scene, self._photons)
+            self._light_of = changes
+        return self._light
 
 
 def _points(samples: int) -> tuple[mi.Point2f, list[mi.Float]]:

@@ -100,7 +100,7 @@ class MitsubaRenderer(Renderer):
             trace_caustics=direct == "with_caustics",
         )
         self.buffer_samples = buffer_samples or BUFFER_SAMPLES[self._variant]
-        self._tracer = _tracer(self._variant, self._scene.scene, first_hit)
+        self._tracer = _tracer(self._variant, self._scene, first_hit)
         self.layout = first_hit.layout
         self._static = needed_only and buffers_are_static(self._scene, self.layout)
         self._static_buffers: dict[int, Tensor] = {}
@@ -258,10 +258,11 @@ class MitsubaRenderer(Renderer):
             )
 
 
-def _tracer(variant: str, scene: mi.Scene, first_hit: FirstHit) -> Tracer:
+def _tracer(variant: str, scene: VariableScene, first_hit: FirstHit) -> Tracer:
     if variant == "scalar_rgb":
-        return ScalarTracer(scene=scene, first_hit=first_hit)
-    return FittingTracer(JitTracer(scene=scene, first_hit=first_hit), free=free_memory)
+        return ScalarTracer(scene=scene.scene, first_hit=first_hit)
+    tracer = JitTracer(scene=scene.scene, first_hit=first_hit, changes=lambda: scene.changes)
+    return FittingTracer(tracer, free=free_memory)
 
 
 def _broken(patches: list[tuple[Tensor, Tensor]]) -> list[int]:

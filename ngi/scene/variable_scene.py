@@ -40,6 +40,12 @@ class VariableScene:
         self._writes = [self._bind(variable) for variable in description.variables]
         self._parameters.forget_the_rest()
         self._values: list[NDArray[np.float64] | None] = [None] * len(self._writes)
+        camera = description.camera_part
+        self._places_camera = [
+            camera.start <= part.start < camera.stop for _, part in description.parts()
+        ]
+        self.changes = 0
+        """How often something else than the camera has changed."""
 
     def _bind(self, variable: Variable) -> Write:
         """ValueError, naming the file and the variable, also for what Mitsuba does not take."""
@@ -128,5 +134,6 @@ class VariableScene:
                 write(value)
                 self._values[i] = value
                 changed = True
+                self.changes += not self._places_camera[i]
         if changed:
             self._parameters.update()

@@ -1,6 +1,6 @@
 """What one browser wants to see, which picture of it is computed next, and how fine it is."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from ngi.view.scene_view import Place, SceneView
@@ -79,10 +79,10 @@ class Session:
         self._previewed = self._wish
 
 
-MOVING = 0.08
+MOVING = 0.095
 """Seconds that a picture may take while something moves; sending it takes some more."""
-FEWEST_RAYS = 4
-"""Per pixel of the buffers: with fewer, shadows of large lights would jump as they settle."""
+FEWEST_RAYS = 3
+"""Per pixel of the buffers: with two, shadows of large lights jump as they settle."""
 DIVISORS = (1, 2, 4)
 """By what the resolution is divided."""
 SMALLEST = 64
@@ -90,46 +90,60 @@ SMALLEST = 64
 
 
 class Pace:
-    """Chooses the finest preview that is quick enough, by how long the last picture took.
+    """Chooses the finest preview that is quick enough, by how long the last pictures took.
 
     rays: per pixel of the buffers of a whole picture
     """
 
     def __init__(self, rays: int) -> None:
         self._rays = rays
-        self._per_unit: dict[str, float] = {}
+        self._seconds: dict[str, dict[int, float]] = {}  # by part and its units, oldest first
 
     def measured(self, view: SceneView) -> None:
         """A picture was made; of its parts the seconds are known."""
-        self._per_unit = {
-            part: seconds / self._units(part, view.place) for part, seconds in view.seconds.items()
-        }
+        before, self._seconds = self._seconds, {}
+        for part, seconds in view.seconds.items():
+            units = self._units(part, view.place)
+            known = [item for item in before.get(part, {}).items() if item[0] != units]
+            self._seconds[part] = dict([*known[-1:], (units, seconds)])
 
     def preview(self, place: Place) -> Place:
-        """The finest that takes at most `MOVING`, by the last picture's speed; else the coarsest.
-
-        What takes a fixed time makes finer ones look slower than they are, so that none is chosen
-        that takes too long; the next choice then knows better.
-        """
+        """The finest that takes at most `MOVING` by what the last ones took; else the coarsest."""
         *finer, coarsest = self._ladder(place)
-        if not self._per_unit:
+        if not self._seconds:
             return coarsest
-        return next((each for each in finer if self._seconds(each) <= MOVING), coarsest)
+        return next((each for each in finer if self._expected(each) <= MOVING), coarsest)
 
     def _ladder(self, whole: Place) -> Iterator[Place]:
         """From the whole picture down: fewer rays first, then fewer pixels."""
         yield whole
         halved = (self._rays >> times for times in range(1, self._rays.bit_length()))
-        fewer: Sequence[int | None] = [rays for rays in halved if rays >= FEWEST_RAYS]
+        fewer: list[int | None] = [rays for rays in halved if rays > FEWEST_RAYS]
+        if self._rays > FEWEST_RAYS:
+            fewer.append(FEWEST_RAYS)
         for divisor in DIVISORS:
             pixels = max(whole.resolution // divisor, min(SMALLEST, whole.resolution))
             for rays in fewer or [whole.rays]:
                 yield replace(whole, resolution=pixels, rays=rays)
 
-    def _seconds(self, place: Place) -> float:
-        return sum(each * self._units(part, place) for part, each in self._per_unit.items())
+    def _expected(self, place: Place) -> float:
+        """Seconds: see `_at`."""
+        return sum(_at(self._units(part, place), known) for part, known in self._seconds.items())
 
     def _units(self, part: str, place: Place) -> int:
         """Rays of the buffers, pixels of all else."""
         rays = (place.rays or self._rays) if part == "buffers" else 1
         return rays * place.resolution**2
+
+
+def _at(units: int, known: Mapping[int, float]) -> float:
+    """Seconds of a part of this size, from those of the one or two sizes that are known.
+
+    There is a fixed time, and one per unit; while a single size is known, the latter only, so that
+    larger pictures are expected to take longer than they do rather than shorter.
+    """
+    *older, (size, seconds) = known.items()
+    per_unit = seconds / size
+    for other, then in older:
+        per_unit = min(max((seconds - then) / (size - other), 0.0), per_unit)
+    return seconds + per_unit * (units - size)

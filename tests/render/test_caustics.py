@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from ngi.machine.backend import llvm_problem, mi
-from ngi.render.caustics import photon_points
+from ngi.render.caustics import Caustics, photon_points
 from ngi.render.first_hit import first_hit_of
 from ngi.render.mitsuba_renderer import MitsubaRenderer
 from ngi.scene import read_scene
@@ -208,3 +208,29 @@ def test_light_stays_on_the_side_of_the_surface_that_it_falls_on(load, tmp_path)
 def test_python_is_too_slow_for_photons(load) -> None:
     with pytest.raises(ValueError, match=r"use renderer\.direct=traced"):
         load(FLOOR + BULB, backend="scalar")
+
+
+def test_photons_are_traced_again_where_more_than_the_camera_moves(load, monkeypatch) -> None:
+    traced = []
+
+    def trace(*arguments):
+        traced.append(arguments)
+        return of_class(*arguments)
+
+    of_class = Caustics.trace
+    monkeypatch.setattr(Caustics, "trace", trace)
+    monkeypatch.setattr("ngi.render.jit_tracer.dr.freeze", lambda function, **_: function)
+    walks = (
+        "{object: camera, property: look_at, minimum: [0, 0, 4, 0, 0, 0], "
+        "maximum: [1, 0, 4, 0, 0, 0], up: [0, 1, 0]}"
+    )
+    shapes = FLOOR + BULB + rectangle("wall", WALL, MIRROR)
+
+    def renderer():
+        return load(shapes, variables=[DIM, walks])
+
+    seen, vectors = renderer(), ([0.2, 0.0], [0.2, 1.0], [0.9, 1.0], [0.2, 1.0], [0.2, 1.0])
+    pictures = [(direct(seen, v), len(traced)) for v in vectors]
+    assert [count for _, count in pictures] == [1, 1, 2, 3, 3]
+    for v, (picture, _) in zip(vectors, pictures, strict=True):
+        np.testing.assert_array_equal(picture, direct(renderer(), v))

@@ -13,7 +13,6 @@ from pathlib import Path
 
 import ngi.studies.benchmark
 from ngi.config.options import option, run_tool
-from ngi.machine.memory import keep_freed_memory
 from ngi.scene import scenes
 from ngi.studies.benchmark.figures import Figure
 from ngi.studies.benchmark.part import TRAINING, Options, Part
@@ -75,7 +74,6 @@ def _measure(
     parts: Sequence[Part], chosen: BenchmarkOptions, named: list[Scene], every: list[str]
 ) -> list[Figure]:
     """named: the scenes asked for; every: those of a part that renders all, where none were."""
-    keep_freed_memory()
     samples = _samples(chosen.samples_per_pixel)
     figures: list[Figure] = []
     try:

@@ -32,6 +32,16 @@ def frames(scene: Scene, *, repeats: int, seconds: float) -> list[Figure]:
     The denoiser is given buffers for nothing: it needs those of the first hit without direct light,
     which take less than ours.
     """
+    renderer, network = ours(scene)
+    made = [
+        _frames(renderer, network, resolution, repeats=repeats, seconds=seconds / len(RESOLUTIONS))
+        for resolution in RESOLUTIONS
+    ]
+    return [figure for figures in made for figure in figures]
+
+
+def ours(scene: Scene) -> tuple[MitsubaRenderer, nn.Module]:
+    """Renderer and untrained network of `method=ours` and `budget=small`."""
     renderer = MitsubaRenderer(scene=scene.read(), direct="with_caustics", specular="traced")
     network = OURS.network(
         layout=renderer.layout,
@@ -40,12 +50,13 @@ def frames(scene: Scene, *, repeats: int, seconds: float) -> list[Figure]:
         hidden_layers=LAYERS,
         relative=True,
         moving=renderer.moving_points,
-    ).to("cuda" if torch.cuda.is_available() else "cpu")
-    made = [
-        _frames(renderer, network, resolution, repeats=repeats, seconds=seconds / len(RESOLUTIONS))
-        for resolution in RESOLUTIONS
-    ]
-    return [figure for figures in made for figure in figures]
+    )
+    return renderer, network.to("cuda" if torch.cuda.is_available() else "cpu")
+
+
+def precision() -> torch.dtype:
+    """Of the network's products on this machine."""
+    return torch.bfloat16 if fast_precision() == "bf16-mixed" else torch.float32
 
 
 def _frames(
@@ -65,7 +76,6 @@ def _frames(
     hard, numbers = renderer.hard_frames(), count()
     buffers = renderer.image_buffers(hard[0], resolution=resolution).cpu()
     noisy = tracing.trace(hard[0], resolution=resolution)
-    precision = torch.bfloat16 if fast_precision() == "bf16-mixed" else torch.float32
 
     def next_v() -> Tensor:
         return hard[next(numbers) % len(hard)]
@@ -74,7 +84,7 @@ def _frames(
         repeats,
         f"frames, {resolution} pixels",
         lambda: renderer.image_buffers(next_v(), resolution=resolution),
-        lambda: show(network, buffers, next_v(), precision),
+        lambda: show(network, buffers, next_v(), precision()),
         lambda: tracing.trace(next_v(), resolution=resolution),
         partial(tracing.denoise, noisy, buffers),
         seconds=seconds,

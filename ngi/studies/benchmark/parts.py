@@ -16,6 +16,7 @@ from ngi.studies.benchmark.scoring import scoring
 from ngi.studies.benchmark.store import store
 from ngi.studies.benchmark.threads import alternation
 from ngi.studies.benchmark.training import OURS, training
+from ngi.studies.benchmark.viewer import viewer
 from ngi.studies.benchmark.waiting import waiting
 from ngi.studies.benchmark.workers import throughput
 
@@ -97,6 +98,12 @@ PARTS = (
         "frames",
         "milliseconds of our frames by part, beside those of path tracing with a denoiser",
         per_scene(lambda scene, o: frames(scene, repeats=o.repeats, seconds=o.seconds)),
+        scenes=("sphere-caustic",),
+    ),
+    Part(
+        "viewer",
+        "pictures per second that the viewer shows while a slider moves, and how fine they are",
+        per_scene(lambda scene, o: viewer(scene, seconds=o.seconds)),
         scenes=("sphere-caustic",),
     ),
 )

@@ -12,7 +12,6 @@ from tqdm import tqdm
 
 from ngi.config.options import option, run_tool
 from ngi.files.durable import write_atomically
-from ngi.machine.memory import keep_freed_memory
 from ngi.studies.stability.case import Case, Row, attempt
 
 
@@ -43,7 +42,6 @@ def stability(chosen: StabilityOptions) -> int:
     names = chosen.groups or [*GROUPS]
     if unknown := sorted(set(names) - set(GROUPS)):
         raise ValueError(f"no group {', '.join(unknown)}; there are {', '.join(GROUPS)}")
-    keep_freed_memory()
     groups = {name: GROUPS[name] for name in names}
     rows = run(groups, matching=chosen.matching)
     if not rows:

@@ -1,7 +1,7 @@
 import pytest
 
 from ngi.machine.backend import llvm_problem
-from ngi.studies.benchmark import frames
+from ngi.studies.benchmark import frames, viewer
 from ngi.studies.benchmark.scenes import shipped
 
 [MIRROR] = shipped(["mirror"])
@@ -19,3 +19,14 @@ def test_frames_take_as_long_as_their_parts(monkeypatch: pytest.MonkeyPatch) -> 
         assert ours == pytest.approx(buffers + network)
         assert denoised == pytest.approx(paths + denoiser)
         assert share == pytest.approx(ours / denoised)
+
+
+@pytest.mark.skipif(llvm_problem() is not None, reason=str(llvm_problem()))
+def test_the_viewer_shows_pictures_while_a_slider_moves(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(viewer, "RESOLUTION", 64)
+    monkeypatch.setattr(viewer, "WARM_UP", 0.5)
+    rate, pixels, rays = viewer.viewer(MIRROR, seconds=1.0)
+    assert 1 < rate.median <= 60  # of 60 positions a second none is shown twice
+    assert rate.limit == "≥ 10"
+    assert pixels.median == 64  # no fewer are ever shown
+    assert 3 <= rays.median <= 16
