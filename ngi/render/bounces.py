@@ -1,7 +1,8 @@
-"""What a specular BSDF does to a ray that meets it: one direction, and one weight.
+"""What a specular BSDF does to a ray that meets it: a direction, and a weight.
 
 The same physics as Mitsuba's BSDFs, but where those would choose between reflection and refraction
-at random, the stronger one is taken; a slightly rough BSDF is taken for a smooth one.
+at random, they are told apart by which is the stronger; a slightly rough BSDF is taken for a smooth
+one.
 """
 
 from __future__ import annotations
@@ -13,9 +14,13 @@ from typing import Any
 from ngi.machine.backend import dr, mi
 from ngi.render.materials import Material, children_of, colour
 
-Bounce = Callable[..., tuple[Any, Any]]
-"""(hit: SurfaceInteraction3f, active: Bool) -> direction in the hit's shading frame: Vector3f, and
-weight of the radiance that comes from there: Color3f."""
+Branch = tuple[Any, Any]
+"""Direction in a hit's shading frame: Vector3f, and weight of the radiance that comes from there:
+Color3f."""
+
+Bounce = Callable[..., tuple[Branch, Branch]]
+"""(hit: SurfaceInteraction3f, active: Bool) -> the stronger branch, and the other one, which has no
+weight where there is none."""
 
 
 @dataclass(frozen=True)
@@ -23,11 +28,13 @@ class SpecularSurface:
     """A BSDF that is specular where its roughness is small.
 
     two_sided: whether it acts on rays from behind too; if not, it is black to them.
+    branches: how many directions the radiance comes from.
     """
 
     material: Material
     bounce: Bounce
     two_sided: bool
+    branches: int
 
 
 def specular_surface(material: Material) -> SpecularSurface | None:
@@ -39,9 +46,9 @@ def specular_surface(material: Material) -> SpecularSurface | None:
         two_sided = sides.get("brdf_1", bsdf) == bsdf
     kind = bsdf.class_name()
     if kind in ("SmoothConductor", "RoughConductor"):
-        return SpecularSurface(material, _conductor(bsdf), two_sided)
+        return SpecularSurface(material, _conductor(bsdf), two_sided, branches=1)
     if kind in _DIELECTRICS:
-        return SpecularSurface(material, _DIELECTRICS[kind](bsdf), two_sided=True)
+        return SpecularSurface(material, _DIELECTRICS[kind](bsdf), two_sided=True, branches=2)
     return None
 
 
@@ -50,17 +57,19 @@ def _conductor(bsdf: mi.BSDF) -> Bounce:
     reflectance = colour(children.get("specular_reflectance"))
     index, absorption = colour(children["eta"]), colour(children["k"])
 
-    def bounce(hit: mi.SurfaceInteraction3f, active: mi.Bool) -> tuple[mi.Vector3f, mi.Color3f]:
+    def bounce(hit: mi.SurfaceInteraction3f, active: mi.Bool) -> tuple[Branch, Branch]:
         cosine = dr.abs(mi.Frame3f.cos_theta(hit.wi))
         channels = zip(index(hit, active), absorption(hit, active), strict=True)
         fresnel = [mi.fresnel_conductor(cosine, mi.Complex2f(n, k)) for n, k in channels]
-        return mi.reflect(hit.wi), mi.Color3f(*fresnel) * reflectance(hit, active)
+        reflected = mi.reflect(hit.wi)
+        weight = mi.Color3f(*fresnel) * reflectance(hit, active)
+        return (reflected, weight), (reflected, mi.Color3f(0))
 
     return bounce
 
 
 def _dielectric(bsdf: mi.BSDF) -> Bounce:
-    """Reflection or refraction, whichever is stronger.
+    """Reflection and refraction.
 
     Refraction scales the radiance by the square of the relative index, as in Mitsuba: entering and
     leaving a body cancel.
@@ -72,21 +81,21 @@ def _dielectric(bsdf: mi.BSDF) -> Bounce:
         return reflected, mi.refract(hit.wi, refracted_cosine, ratio), dr.square(ratio)
 
     index = _index(bsdf)
-    return _stronger(bsdf, branches)
+    return _by_strength(bsdf, branches)
 
 
 def _thin_dielectric(bsdf: mi.BSDF) -> Bounce:
-    """Reflection, with all that goes to and fro inside the sheet, or straight on."""
+    """Reflection, with all that goes to and fro inside the sheet, and straight on."""
 
     def branches(hit: mi.SurfaceInteraction3f) -> tuple[mi.Float, mi.Vector3f, mi.Float]:
         reflected = mi.fresnel(dr.abs(mi.Frame3f.cos_theta(hit.wi)), index())[0]
         return 2 * reflected / (1 + reflected), -hit.wi, mi.Float(1)
 
     index = _index(bsdf)
-    return _stronger(bsdf, branches)
+    return _by_strength(bsdf, branches)
 
 
-def _stronger(
+def _by_strength(
     bsdf: mi.BSDF,
     branches: Callable[[mi.SurfaceInteraction3f], tuple[mi.Float, mi.Vector3f, mi.Float]],
 ) -> Bounce:
@@ -95,14 +104,12 @@ def _stronger(
     reflectance = colour(children.get("specular_reflectance"))
     transmittance = colour(children.get("specular_transmittance"))
 
-    def bounce(hit: mi.SurfaceInteraction3f, active: mi.Bool) -> tuple[mi.Vector3f, mi.Color3f]:
-        share, passing, factor = branches(hit)
+    def bounce(hit: mi.SurfaceInteraction3f, active: mi.Bool) -> tuple[Branch, Branch]:
+        share, through, factor = branches(hit)
+        reflected = mi.reflect(hit.wi), share * reflectance(hit, active)
+        passing = through, (1 - share) * factor * transmittance(hit, active)
         reflects = share > 0.5
-        return dr.select(reflects, mi.reflect(hit.wi), passing), dr.select(
-            reflects,
-            share * reflectance(hit, active),
-            (1 - share) * factor * transmittance(hit, active),
-        )
+        return dr.select(reflects, reflected, passing), dr.select(reflects, passing, reflected)
 
     return bounce
 

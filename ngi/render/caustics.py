@@ -101,7 +101,7 @@ def caustics_of(scene: VariableScene, chain: SpecularChain) -> Caustics | None:
     if not mirrors or bounces < 1:
         return None
     return Caustics(
-        replace(chain, maximum_bounces=bounces),
+        replace(chain, maximum_bounces=bounces, highlights=False),
         mirrors,
         IrradiancePictures(scene.description.bounds),
     )

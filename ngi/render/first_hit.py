@@ -106,7 +106,7 @@ def first_hit_of(
     layout = needed_layout(needs) if needed_only else BufferLayout()
     if trace_direct and (direct_need(scene).needed or not needed_only):
         layout = layout.adding(["direct"])
-    specular = specular_chain(scene, materials)
+    specular = specular_chain(scene, materials, highlights=trace_direct)
     chain = specular if trace_specular else None
     caustics = None
     if trace_caustics and specular is not None and "direct" in layout.names:

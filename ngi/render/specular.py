@@ -3,7 +3,8 @@
 "When ray tracing hardware is available our method benefits by tracing all specular bounces during
 the buffer generation": the network then learns the non-specular shading of what is seen there. A
 camera ray goes on in one direction, the one that most of the light comes from; Mitsuba's own path
-tracer would choose one at random.
+tracer would choose one at random. In the other direction only emitters are looked for: the lamp
+that a sheet of glass mirrors beside what it lets through.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ngi.machine.backend import dr, mi
-from ngi.render.bounces import SpecularSurface, specular_surface
+from ngi.render.bounces import Branch, SpecularSurface, specular_surface
 from ngi.render.direct_light import emission
 from ngi.render.materials import Material, collect_materials, has_bsdf
 from ngi.scene.variable_scene import VariableScene
@@ -35,7 +36,7 @@ class ChainEnd:
     throughput: product of the weights of the bounces, 1 where there was none.
     roughness: sqrt(sum of alpha^2) over the bounces.
     emission: linear radiance of every emitter on the way, the environment included, times the
-        throughput up to it.
+        throughput up to it; with highlights, of those in the other directions too.
     segments: of the path so far, one more than there were bounces.
     """
 
@@ -54,12 +55,14 @@ class SpecularChain:
     surfaces: at least one. maximum_bounces: at least 1. longest_path: the scene's max_depth.
     buffers: those that the scene carries because of them. Once there are bounces, the position
         does not tell the outgoing direction any more, nor does the camera's view what is seen.
+    highlights: whether emitters are looked for in the directions that are not followed.
     """
 
     surfaces: list[SpecularSurface]
     maximum_bounces: int
     longest_path: int
     buffers: tuple[str, ...]
+    highlights: bool
 
     def follow(self, scene: mi.Scene, ray: mi.Ray3f) -> ChainEnd:
         """A loop in the kernel, or in Python where the variant is scalar.
@@ -79,7 +82,9 @@ class SpecularChain:
             hit = met.compute_surface_interaction(ray, mi.RayFlags.All, active)
             emitted = emitted + throughput * emission(scene, hit)
             active = active & hit.is_valid() & (bounces < self.maximum_bounces)
-            goes_on, direction, weight, alpha = self._bounce(hit, active)
+            goes_on, (direction, weight), other, alpha = self._bounce(hit, active)
+            if self.highlights:
+                emitted = emitted + throughput * _emission_along(other, scene, hit, goes_on)
             beyond = hit.spawn_ray(hit.to_world(direction))
             ray = dr.select(goes_on, beyond, ray)
             return (
@@ -114,29 +119,43 @@ class SpecularChain:
 
     def _bounce(
         self, hit: mi.SurfaceInteraction3f, active: mi.Bool
-    ) -> tuple[mi.Bool, mi.Vector3f, mi.Color3f, mi.Float]:
-        """Whether the ray goes on, its direction, weight and alpha."""
-        goes_on, direction = mi.Bool(False), mi.Vector3f(0)
-        weight, alpha = mi.Color3f(0), mi.Float(0)
+    ) -> tuple[mi.Bool, Branch, Branch, mi.Float]:
+        """Whether the ray goes on, the branch that it follows, the other one, and alpha."""
+        goes_on, alpha = mi.Bool(False), mi.Float(0)
+        followed, other = ((mi.Vector3f(0, 0, 1), mi.Color3f(0)) for _ in range(2))
         for surface in self.surfaces:
             here = active & has_bsdf(hit, surface.material.bsdf, active)
             if not surface.two_sided:
                 here = here & (mi.Frame3f.cos_theta(hit.wi) > 0)
             roughness = surface.material.roughness(hit, here)
             here = here & (roughness <= SPECULAR_ROUGHNESS)
-            towards, factor = surface.bounce(hit, here)
+            stronger, weaker = surface.bounce(hit, here)
             goes_on = goes_on | here
-            direction = dr.select(here, towards, direction)
-            weight = dr.select(here, factor, weight)
+            followed = dr.select(here, stronger, followed)
+            other = dr.select(here, weaker, other)
             alpha = dr.select(here, roughness, alpha)
-        return goes_on, direction, weight, alpha
+        return goes_on, followed, other, alpha
 
 
-def specular_chain(scene: VariableScene, materials: list[Material]) -> SpecularChain | None:
+def _emission_along(
+    branch: Branch, scene: mi.Scene, hit: mi.SurfaceInteraction3f, active: mi.Bool
+) -> mi.Color3f:
+    """Linear radiance of the emitter that is seen there from a hit, times the branch's weight."""
+    direction, weight = branch
+    active = active & (dr.max(mi.Color3f(weight)) > 0)
+    seen = scene.ray_intersect(hit.spawn_ray(hit.to_world(direction)), active)
+    return dr.select(active, weight * emission(scene, seen), 0)
+
+
+def specular_chain(
+    scene: VariableScene, materials: list[Material], *, highlights: bool
+) -> SpecularChain | None:
     """The chains of a scene, or None where nothing in it is specular at any v.
 
     No longer than the scene's paths: what lies beyond them emits nothing in its pictures. Leaves
     the scene at v = 0.
+
+    highlights: see `SpecularChain`; for nothing where no surface has two branches.
     """
     scene.apply(np.zeros(scene.description.dimensions))  # every roughness at its minimum
     lowest = [m.constant_roughness for m in collect_materials([m.bsdf for m in materials])]
@@ -156,4 +175,5 @@ def specular_chain(scene: VariableScene, materials: list[Material]) -> SpecularC
         buffers.append("chain_roughness")
     if scene.scene.environment() or any(shape.is_emitter() for shape in scene.shapes):
         buffers.append("emission")
-    return SpecularChain(surfaces, bounces, longest_path, tuple(buffers))
+    highlights = highlights and any(surface.branches == 2 for surface in surfaces)
+    return SpecularChain(surfaces, bounces, longest_path, tuple(buffers), highlights)

@@ -140,6 +140,34 @@ def test_emission_is_the_path_traced_radiance_but_for_the_branches_not_taken(loa
     assert radiance.std() > 0.05
 
 
+def test_a_pane_mirrors_the_sky_beside_what_it_lets_through(load, backend) -> None:
+    pane = GLASS.replace('"dielectric"', '"thindielectric"')
+    shapes = BACK.replace(PICTURE, PLAIN) + SKY + rectangle("pane", '<scale value="2"/>', pane)
+    share = fresnel(-rays(RESOLUTION)[..., 2:], INDEX)
+    mirrored = np.broadcast_to(2 * share / (1 + share), (RESOLUTION, RESOLUTION, 3))
+    for direct, seen_of_sky in (("traced", 0.3), ("learned", 0.0)):
+        emission = buffers(load(shapes, backend=backend, direct=direct))["emission"]
+        expected = 0.5 * (1 - mirrored) + seen_of_sky * mirrored
+        np.testing.assert_allclose(np.expm1(emission), expected, atol=1e-4)
+
+
+def test_with_highlights_all_that_two_bounces_show_of_emitters_is_there(load) -> None:
+    """Longer paths than to the sky by one bounce or to the wall by two Mitsuba does not trace."""
+    if (problem := llvm_problem()) is not None:
+        pytest.skip(problem)
+    arguments = {"backend": "llvm", "max_depth": 3, "buffer_samples": 1024}
+    radiance, found = None, []
+    for direct in ("traced", "learned"):
+        renderer = load(BACK + SKY + PLATE, direct=direct, **arguments)
+        if radiance is None:
+            radiance = renderer.render_image(
+                torch.zeros(3), resolution=12, samples_per_pixel=2**14, seed=0
+            ).numpy()
+        found.append(np.expm1(buffers(renderer, resolution=12)["emission"]))
+    np.testing.assert_allclose(found[0], radiance, atol=0.012)
+    assert (radiance - found[1]).mean() > 0.01
+
+
 def test_total_internal_reflection(load, backend) -> None:
     """A bar of glass: rays that enter its front are reflected by its side and leave by its end."""
     bar = f'<shape type="cube"><transform name="to_world"><scale x="0.3" y="2" z="1"/>\
