@@ -142,9 +142,10 @@ def _emission_along(
 ) -> mi.Color3f:
     """Linear radiance of the emitter that is seen there from a hit, times the branch's weight."""
     direction, weight = branch
-    active = active & (dr.max(mi.Color3f(weight)) > 0)
-    seen = scene.ray_intersect(hit.spawn_ray(hit.to_world(direction)), active)
-    return dr.select(active, weight * emission(scene, seen), 0)
+    active = active & (dr.max(weight) > 0)
+    return weight * emission(
+        scene, scene.ray_intersect(hit.spawn_ray(hit.to_world(direction)), active)
+    )
 
 
 def specular_chain(

@@ -151,6 +151,18 @@ def test_a_pane_mirrors_the_sky_beside_what_it_lets_through(load, backend) -> No
         np.testing.assert_allclose(np.expm1(emission), expected, atol=1e-4)
 
 
+def test_what_a_mirror_shows_of_a_pane_has_passed_both(load, backend) -> None:
+    to_world = '<scale value="3"/><rotate y="1" angle="-60"/><translate x="2"/>'
+    pane = rectangle("pane", to_world, GLASS.replace('"dielectric"', '"thindielectric"'))
+    shapes = SCENES["mirror"].replace(PICTURE, PLAIN) + pane
+    _, away, throughput, met = mirror()
+    share = fresnel(-dot(away, np.array([-np.sqrt(0.75), 0, 0.5])), INDEX)
+    mirrored = 2 * share / (1 + share)
+    seen = buffers(load(shapes, backend=backend, direct="traced"))
+    expected = throughput * (0.5 * (1 - mirrored) + 0.3 * mirrored)
+    np.testing.assert_allclose(np.expm1(seen["emission"])[met], expected[met], atol=1e-4)
+
+
 def test_with_highlights_all_that_two_bounces_show_of_emitters_is_there(load) -> None:
     """Longer paths than to the sky by one bounce or to the wall by two Mitsuba does not trace."""
     if (problem := llvm_problem()) is not None:
