@@ -8,8 +8,10 @@ from contextlib import contextmanager
 from time import monotonic, sleep
 
 import numpy as np
+from torch import nn
 
 from ngi.methods.path_tracing.frame_time import show
+from ngi.render.mitsuba_renderer import MitsubaRenderer
 from ngi.studies.benchmark.figures import Figure, figure
 from ngi.studies.benchmark.frames import ours, precision
 from ngi.studies.benchmark.scenes import Scene
@@ -27,11 +29,24 @@ WARM_UP = 3.0
 
 
 def viewer(scene: Scene, *, seconds: float) -> list[Figure]:
-    """Pictures per second, and how fine they are, while the first variable goes to and fro.
+    """Pictures per second, and how fine they are, while a variable goes to and fro.
 
-    Of the way to the browser nothing is measured.
+    That is the first that places the camera, if any, and the first of all others: then photons are
+    traced anew for each picture. Of the way to the browser nothing is measured.
     """
     renderer, network = ours(scene)
+    camera = range(renderer.dimensions)[renderer.camera_part]
+    others = [number for number in range(renderer.dimensions) if number not in camera]
+    made = []
+    for name, moving in (("the camera moves", camera[:1]), ("something else moves", others[:1])):
+        for component in moving:
+            made += _while_moving(name, component, renderer, network, seconds=seconds / 2)
+    return made
+
+
+def _while_moving(
+    name: str, component: int, renderer: MitsubaRenderer, network: nn.Module, *, seconds: float
+) -> list[Figure]:
     bits = precision()
     studio = Studio(
         renderer=renderer, predict=lambda buffers, v: show(network, buffers, v, bits).float()
@@ -40,7 +55,8 @@ def viewer(scene: Scene, *, seconds: float) -> list[Figure]:
 
     def wish(moves: int) -> Wish:
         place = abs(moves % (2 * MOVES) - MOVES) / MOVES
-        return Wish(Place((place, *first[1:]), RESOLUTION), Screen())
+        v = (*first[:component], place, *first[component + 1 :])
+        return Wish(Place(v, RESOLUTION), Screen())
 
     pictures: list[tuple[float, Place]] = []
 
@@ -56,9 +72,9 @@ def viewer(scene: Scene, *, seconds: float) -> list[Figure]:
     times, places = zip(*(each for each in pictures if each[0] >= begin), strict=True)
     rays = [place.rays or renderer.buffer_samples for place in places]
     return [
-        figure("pictures per second", (1 / np.diff(times)).tolist(), "1/s", "≥ 10"),
-        figure("pixels a side", [place.resolution for place in places], "pixels"),
-        figure("rays per pixel", rays, "rays"),
+        figure(f"pictures per second, {name}", (1 / np.diff(times)).tolist(), "1/s", "≥ 10"),
+        figure(f"pixels a side, {name}", [place.resolution for place in places], "pixels"),
+        figure(f"rays per pixel, {name}", rays, "rays"),
     ]
 
 
