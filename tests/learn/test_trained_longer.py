@@ -17,7 +17,7 @@ from tests.learn.test_checkpoint import segments
 
 pytestmark = [*IGNORED, RESUMED]
 
-WSD = ("schedule=warmup_stable_decay", "schedule.warmup_steps=3")
+WSD = ("schedule=warmup_stable_decay", "schedule.warmup_steps=3", "schedule.decay_share=0.5")
 FORGETFUL = "reuse.store.capacity=12"
 """What the checkpoint before the decay needs is forgotten by the end of the run."""
 LEARNERS = {
