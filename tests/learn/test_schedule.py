@@ -98,6 +98,7 @@ def test_every_step_is_taken_at_its_rate_and_the_clocks_share_decides(
         f"optimizer={optimizer}",
         "schedule=warmup_stable_decay",
         "schedule.warmup_steps=4",
+        "schedule.decay_share=0.5",
         "evaluation.count=1",
     )
     train(config)
