@@ -64,11 +64,11 @@ def _seen(scene: VariableScene, variable: Variable) -> bool:
 
 
 def _moved(scene: VariableScene, variable: Variable, part: slice) -> _Moved:
-    box = mi.ScalarBoundingBox3f()
     owners = scene.owners(variable)
-    for owner in owners:
-        box.expand(owner.bbox())
+    boxes = [owner.bbox() for owner in owners]
+    low = np.min([np.ravel(box.min) for box in boxes], axis=0)
+    high = np.max([np.ravel(box.max) for box in boxes], axis=0)
     count = part.stop - part.start
     start = variable.value(np.zeros(count))
     columns = np.stack([variable.value(unit) - start for unit in np.eye(count)], axis=1)
-    return _Moved(np.array(box.center()).ravel(), columns, part, any(map(emits, owners)))
+    return _Moved((low + high) / 2, columns, part, any(map(emits, owners)))
