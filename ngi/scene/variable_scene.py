@@ -40,10 +40,7 @@ class VariableScene:
         self._writes = [self._bind(variable) for variable in description.variables]
         self._parameters.forget_the_rest()
         self._values: list[NDArray[np.float64] | None] = [None] * len(self._writes)
-        camera = description.camera_part
-        self._places_camera = [
-            camera.start <= part.start < camera.stop for _, part in description.parts()
-        ]
+        self._places_camera = [part == description.camera_part for _, part in description.parts()]
         self.changes = 0
         """How often something else than the camera has changed."""
 

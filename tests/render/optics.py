@@ -9,10 +9,10 @@ SIZE = 5.0
 
 
 def write_scene(folder, *, shapes, variables, max_depth=10, fov=20, image=None) -> None:
-    """A camera at ORIGIN that looks along -z; image [h, w, 3]: of the texture 'picture.png'."""
+    """A 'camera' at ORIGIN that looks along -z; image [h, w, 3]: of the texture 'picture.png'."""
     (folder / "scene.xml").write_text(f"""<scene version="3.0.0">
         <integrator type="path"><integer name="max_depth" value="{max_depth}"/></integrator>
-        <sensor type="perspective"><float name="fov" value="{fov}"/>
+        <sensor id="camera" type="perspective"><float name="fov" value="{fov}"/>
             <transform name="to_world">
                 <lookat origin="0, 0, 4" target="0, 0, 0" up="0, 1, 0"/></transform>
             <film type="hdrfilm"><integer name="width" value="8"/>

@@ -43,8 +43,6 @@ def load(tmp_path):
 
     def load(shapes, *, variables=(DIM,), max_depth=5, direct="with_caustics", **arguments):
         write_scene(tmp_path, shapes=shapes, variables=variables, max_depth=max_depth, fov=40)
-        text = (tmp_path / "scene.xml").read_text()
-        (tmp_path / "scene.xml").write_text(text.replace("<sensor ", '<sensor id="camera" '))
         arguments = {"backend": "llvm", "patch_size": 8, "buffer_samples": 4} | arguments
         return MitsubaRenderer(scene=read_scene(tmp_path), direct=direct, **arguments)
 

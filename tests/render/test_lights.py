@@ -1,5 +1,8 @@
 """Lights and the field of view that vary, against the inverse-square law and a pinhole."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 import torch
@@ -37,8 +40,6 @@ def load(request, tmp_path):
 
     def load(light, *variables, **arguments):
         write_scene(tmp_path, shapes=WALL + light, variables=(), max_depth=2)
-        text = (tmp_path / "scene.xml").read_text()
-        (tmp_path / "scene.xml").write_text(text.replace("<sensor ", '<sensor id="camera" '))
         text = (tmp_path / "scene.yaml").read_text()
         lines = [line for line in text.splitlines() if "camera_path" not in line]
         lines[-1] = f"variables: [{', '.join(variables)}]}}"
@@ -117,6 +118,17 @@ def test_the_renderer_tells_where_a_light_without_a_surface_is(load, light) -> N
         place = PLACE + [-1, -1, 0] + np.array([2, 2, 1]) * v.numpy()
         ((*position,),) = (points.weight @ v + points.offset).tolist()
         np.testing.assert_allclose((2 * np.array(position) - 1) * SIZE, place, atol=1e-5)
+
+
+def test_no_other_variant_of_mitsuba_has_to_be_loaded_first(load, tmp_path) -> None:
+    load(POINT, MOVES)
+    program = (
+        "from ngi.render.mitsuba_renderer import MitsubaRenderer as R; "
+        "from ngi.scene import read_scene; "
+        f"print(len(R(scene=read_scene({str(tmp_path)!r}), backend='scalar').moving_points.weight))"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.stdout == "1\n", done.stderr
 
 
 def test_what_moves_a_light_changes_no_buffer(load) -> None:

@@ -76,6 +76,7 @@ def _frames(
     hard, numbers = renderer.hard_frames(), count()
     buffers = renderer.image_buffers(hard[0], resolution=resolution).cpu()
     noisy = tracing.trace(hard[0], resolution=resolution)
+    bits = precision()
 
     def next_v() -> Tensor:
         return hard[next(numbers) % len(hard)]
@@ -84,7 +85,7 @@ def _frames(
         repeats,
         f"frames, {resolution} pixels",
         lambda: renderer.image_buffers(next_v(), resolution=resolution),
-        lambda: show(network, buffers, next_v(), precision()),
+        lambda: show(network, buffers, next_v(), bits),
         lambda: tracing.trace(next_v(), resolution=resolution),
         partial(tracing.denoise, noisy, buffers),
         seconds=seconds,
