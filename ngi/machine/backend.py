@@ -11,10 +11,8 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
-from contextlib import suppress
 from ctypes import CDLL
 from functools import cache
-from pathlib import Path
 
 from ngi.machine.llvm import INSTALL_COMMAND, find_llvm, llvm_candidates
 
@@ -44,23 +42,6 @@ if dr.thread_count() < 2:
     # On one core Dr.Jit has no worker thread, and Mitsuba 3.9 waits for one for ever with every EXR
     # file that it reads or writes (docs/upstream.md).
     dr.set_thread_count(2)
-
-WORK_UNIT = 2**11
-"""Elements of a kernel that a thread takes at a time. Dr.Jit's own 16,384 are all the rays of a
-patch's buffers, or all photons: one thread would trace them.
-"""
-
-_SET_WORK_UNIT = "_Z23jit_llvm_set_block_sizej"
-"""jit_llvm_set_block_size, which Dr.Jit 1.5 exports for C++ only (docs/explanation/upgrades.md)."""
-
-
-def _share_work(core: Path) -> None:
-    """Has the LLVM backend's kernels shared in such units, where its library is as expected."""
-    with suppress(OSError, AttributeError):
-        CDLL(str(core))[_SET_WORK_UNIT](WORK_UNIT)
-
-
-_share_work(Path(dr.__file__).with_name("libdrjit-core.so"))
 
 __all__ = ["VARIANTS", "activate", "cuda_problem", "describe", "dr", "llvm_problem", "mi"]
 

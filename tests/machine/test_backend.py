@@ -1,6 +1,4 @@
 import logging
-from ctypes import CDLL
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -64,33 +62,3 @@ def test_a_gpu_needs_a_pytorch_that_can_use_it(monkeypatch) -> None:
     assert backend.cuda_problem.__wrapped__() is None
     monkeypatch.setattr(backend, "_has_driver", False)
     assert "no NVIDIA driver" in (backend.cuda_problem.__wrapped__() or "")
-
-
-CORE = Path(backend.dr.__file__).with_name("libdrjit-core.so")
-
-
-needs_library = pytest.mark.skipif(
-    not CORE.is_file(), reason="Dr.Jit's library has another name here"
-)
-
-
-@needs_library
-def test_kernels_are_shared_in_small_units() -> None:
-    """Dr.Jit's own functions to ask for the size and to set it, by their mangled names."""
-    core = CDLL(str(CORE))
-    assert core["_Z19jit_llvm_block_sizev"]() == backend.WORK_UNIT
-    core["_Z23jit_llvm_set_block_sizej"](2**14)
-    backend._share_work(CORE)
-    assert core["_Z19jit_llvm_block_sizev"]() == backend.WORK_UNIT
-
-
-@needs_library
-def test_another_library_is_left_alone(monkeypatch, tmp_path) -> None:
-    core = CDLL(str(CORE))
-    core["_Z23jit_llvm_set_block_sizej"](2**14)
-    backend._share_work(tmp_path / "libdrjit-core.so")
-    with monkeypatch.context() as patch:
-        patch.setattr(backend, "_SET_WORK_UNIT", "not_there")
-        backend._share_work(CORE)
-    assert core["_Z19jit_llvm_block_sizev"]() == 2**14
-    backend._share_work(CORE)
