@@ -47,7 +47,7 @@ class MuonAdam(torch.optim.Optimizer):
         self,
         params: Iterable[nn.Parameter],
         *,
-        lr: float = 9e-3,
+        lr: float = 3e-3,
         adam_lr: float = 3e-3,
         momentum: float = 0.95,
         clip_norm: float = 1.0,
