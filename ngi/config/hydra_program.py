@@ -80,6 +80,8 @@ def run_program(program: Callable[[], None]) -> None:
     except (CompactHydraException, OmegaConfBaseException) as error:
         sys.exit(explained(error))
     except (OSError, ValueError) as error:  # where Hydra makes the folder, or its log in there
+        if str(error).startswith("Only one of --run"):
+            sys.exit(f"{error}; the settings of one run of a sweep: without -m, --cfg job")
         cause = error if isinstance(error, OSError) else error.__cause__
         if not isinstance(cause, OSError):
             raise

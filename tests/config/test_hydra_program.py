@@ -46,6 +46,13 @@ def test_of_what_does_not_exist_the_nearest_is_named(word: str, message: str) ->
     assert message in explained(raised.value)
 
 
+def test_a_sweep_whose_settings_are_asked_for_is_told_how(tmp_path: Path) -> None:
+    status, output = run_module("ngi.train", "-m", "seed=0,1", "--cfg", "job", folder=tmp_path)
+    assert status == 1
+    assert output.count("\n") == 1
+    assert output.endswith("the settings of one run of a sweep: without -m, --cfg job\n")
+
+
 @pytest.mark.parametrize("module", ["ngi.train", "ngi.studies.costs", "ngi.studies.noise"])
 def test_a_mistyped_key_is_said_in_one_line_and_leaves_nothing(module: str, tmp_path: Path) -> None:
     words = ("renderer=analytic", "budget=smoke", "model.hidden_feature=64")
