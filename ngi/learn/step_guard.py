@@ -96,7 +96,9 @@ def largest_moment(optimizer: torch.optim.Optimizer) -> Tensor:
 
 
 def _norm(tensors: list[Tensor], order: float) -> Tensor:
-    return torch.nn.utils.get_total_norm(tensors, order) if tensors else torch.zeros(())
+    """0 of nothing, such as the weights of a v that has no components."""
+    held = [tensor for tensor in tensors if tensor.numel()]
+    return torch.nn.utils.get_total_norm(held, order) if held else torch.zeros(())
 
 
 class StepGuard:

@@ -24,9 +24,10 @@ from ngi.learn import (
 )
 from ngi.learn.lightning_api import Callback, Trainer
 from ngi.learn.module import OptimizerFactory
-from ngi.learn.step_guard import LARGEST_NORM, REFUSED_IN_A_ROW
+from ngi.learn.step_guard import LARGEST_NORM, REFUSED_IN_A_ROW, largest_moment
 from ngi.learn.stream import TrainingStream
 from ngi.models import L1Dssim, MuonAdam, PixelGenerator
+from ngi.models.pixel_mlp import PixelMLP
 from ngi.render import AnalyticRenderer, RenderedPatches
 from tests.learn.lightning_warnings import IGNORED
 from tests.learn.small_stream import make
@@ -281,3 +282,17 @@ def test_patches_that_are_not_finite_are_replaced_and_named(
 def test_a_renderer_that_gives_nothing_finite_stops_the_run(tmp_path: Path) -> None:
     with pytest.raises(FloatingPointError, match="9 batches before: the renderer gives no usable"):
         train(tmp_path, 5, renderer=BrokenRenderer(calls=None))
+
+
+def test_weights_without_entries_have_no_moments() -> None:
+    network = PixelMLP(
+        pixel_features=3, patch_features=0, hidden_features=32, hidden_layers=2, out_features=3
+    )
+    optimizer = MuonAdam(network.parameters(), lr=0.1)
+    network(torch.rand(2, 5, 3), torch.empty(2, 0)).square().sum().backward()
+    optimizer.step()
+    assert network.patch_weight.numel() == 0
+    kept = [v for s in optimizer.state.values() for n, v in s.items() if n != "step"]
+    largest = max(float(moment.abs().max()) for moment in kept if moment.numel())
+    assert float(largest_moment(optimizer)) == pytest.approx(largest)
+    assert float(largest_moment(torch.optim.Adam([torch.empty(3, 0, requires_grad=True)]))) == 0
