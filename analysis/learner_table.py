@@ -2,8 +2,9 @@
 
 `python -m analysis.learner_table` writes them between markers of README.md and of
 docs/learner/README.md, from docs/learner/results.csv and ablation.csv. Both files are those of a
-report (`ngi report`), the latter on runs of `sweeps/learner`. What frames take comes from
-docs/learner/frames.json, which `ngi benchmark frames` writes.
+report (`ngi report`), the latter on runs of `sweeps/learner`; so is minute.csv, of
+`sweeps/minute`. What frames take comes from docs/learner/frames.json, which `ngi benchmark frames`
+writes.
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ BEGIN, END = "<!-- learner: written by analysis.learner_table -->", "<!-- end of
 
 ABLATION = Path("docs/learner/ablation.csv")
 OF_PARTS = ("<!-- parts: written by analysis.learner_table -->", "<!-- end of parts -->")
+MINUTE = Path("docs/learner/minute.csv")
+OF_MINUTE = ("<!-- minute: written by analysis.learner_table -->", "<!-- end of minute -->")
 FRAMES = Path("docs/learner/frames.json")
 OF_FRAMES = ("<!-- frames: written by analysis.learner_table -->", "<!-- end of frames -->")
 OURS, PAPER = "ours", "active_exploration"
@@ -108,6 +111,21 @@ def with_parts(page: str, results: pd.DataFrame) -> str:
     return between_markers(page, parts_table(results), begin=begin, end=end)
 
 
+def with_minute(page: str, results: pd.DataFrame) -> str:
+    """The page with the table of a minute's training.
+
+    Raises ValueError where its markers are missing, or a scene has no results of a method.
+    """
+    methods = list(METHODS)[:3]
+    trained = results.groupby("scene")["method"].agg(set)
+    for scene, there in trained.items():
+        if missing := [method for method in methods if method not in there]:
+            raise ValueError(f"{MINUTE}: '{scene}' has no results of {', '.join(missing)}")
+    begin, end = OF_MINUTE
+    table = learner_table(results, METRICS, methods)
+    return between_markers(page, table, begin=begin, end=end)
+
+
 def with_frames(page: str, benchmark: Mapping[str, Any]) -> str:
     """The page with its table of frames. Raises ValueError where its markers are missing."""
     begin, end = OF_FRAMES
@@ -122,6 +140,7 @@ def main() -> int:
             page.write_text(written(page.read_text(), results, page))
         page = Path("docs/learner/README.md")
         text = with_parts(page.read_text(), pd.read_csv(ABLATION))
+        text = with_minute(text, pd.read_csv(MINUTE))
         page.write_text(with_frames(text, json.loads(FRAMES.read_text())))
     except (OSError, ValueError) as error:
         print(f"error: {error}", file=sys.stderr)

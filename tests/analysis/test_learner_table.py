@@ -5,21 +5,26 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+import yaml
 
 from analysis.learner_table import (
     ABLATION,
     BEGIN,
     END,
     FRAMES,
+    MINUTE,
+    OF_MINUTE,
     PAGES,
     RESULTS,
     learner_table,
     parts_table,
     with_frames,
+    with_minute,
     with_parts,
     written,
 )
 from analysis.parts_of_frames import frames_table
+from analysis.runs import METRICS
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -44,6 +49,27 @@ def test_the_page_has_the_times_of_the_benchmark() -> None:
     assert text == with_frames(text, json.loads((ROOT / FRAMES).read_text())), (
         "python -m analysis.learner_table writes it"
     )
+
+
+def test_the_page_has_the_numbers_of_every_scene_of_the_minute() -> None:
+    text = (ROOT / "docs/learner/README.md").read_text()
+    minute = pd.read_csv(ROOT / MINUTE)
+    assert text == with_minute(text, minute), "python -m analysis.learner_table writes it"
+    sweep = yaml.safe_load((ROOT / "sweeps/minute.yaml").read_text())
+    scenes = sweep["hydra"]["sweeper"]["params"]["scene"].replace(" ", "").split(",")
+    assert len(scenes) == 16
+    assert set(scenes) <= set(minute["scene"])
+
+
+def test_a_scene_that_a_method_has_not_trained_on_is_named() -> None:
+    errors = {f"hard_{metric}": 0.1 for metric in METRICS}
+    methods = ("ours", "path_tracing_oidn_8spp", "active_exploration")
+    rows = [*(("box", method) for method in methods), *(("hall", m) for m in methods[:2])]
+    minute = pd.DataFrame([{"scene": s, "method": m, "seeds": 0, **errors} for s, m in rows])
+    page = "\n".join(OF_MINUTE)
+    assert "| box | 1 |" in with_minute(page, minute[:3])
+    with pytest.raises(ValueError, match="'hall' has no results of active_exploration"):
+        with_minute(page, minute)
 
 
 def frame_figure(name: str, median: float, *, scene: str = "box", part: str = "frames") -> dict:

@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 
 from analysis.readme_table import claim_lines
+from analysis.runs import METRICS
 from tests.docs.pages import ROOT
 
 PHRASES = {
@@ -61,6 +62,19 @@ def time_to_the_papers_error() -> float:
 )
 def test_ours_is_not_said_to_be_faster_than_it_is(page: str, pattern: str) -> None:
     assert time_to_the_papers_error() <= FRACTIONS[said(page, pattern)[0]]
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/learner/README.md"])
+def test_ours_is_better_after_a_minute_on_as_many_scenes_as_is_said(page: str) -> None:
+    errors = pd.read_csv(ROOT / "docs/learner/minute.csv").set_index(["method", "scene"])
+    errors = errors[[f"hard_{metric}" for metric in METRICS]]
+    ours = errors.loc["ours"]
+    better = [
+        int((ours < errors.loc[method].loc[ours.index]).all(axis=1).sum())
+        for method in ("active_exploration", "path_tracing_oidn_8spp")
+    ]
+    figures = said(page, r"in all four metrics on (\d+) of (\d+) scenes.+?pixel on (\d+)")
+    assert [int(figure) for figure in figures] == [better[0], len(ours), better[1]]
 
 
 def test_a_frame_of_ours_takes_the_share_of_the_denoisers_time_that_is_said() -> None:
