@@ -1,4 +1,4 @@
-"""The training loss: L1 and structural dissimilarity of log1p radiance, one value per sample."""
+"""The training loss: L1 and structural dissimilarity of radiance, one value per sample."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -20,6 +20,10 @@ class SampleLoss(Protocol):
 class L1Dssim:
     """l1_weight · mean |prediction − target| + dssim_weight · (1 − SSIM) / 2 (paper, Sec. 6).
 
+    Ours adds relative_weight · mean |log(r + relative_offset) − log(r' + relative_offset)|, with r
+    and r' the radiance that is predicted and wanted. In log1p radiance an error of half the
+    light counts next to nothing where there is little of it; here it counts alike everywhere.
+
     SSIM is that of Wang et al. 2004: Gaussian window, weighted (not sample) covariances, each
     channel by itself, averaged over the windows that lie in the patch. It is computed in float32
     (float64 for float64 input), under autocast too.
@@ -29,6 +33,8 @@ class L1Dssim:
     sigma: the Gaussian's standard deviation, in pixels
     k1, k2: stabilise the ratio where means or variances vanish
     data_range: L, the range of the values, in log1p radiance; the release takes 1
+    relative_weight: 0 in the paper
+    relative_offset: in radiance; what is far below it counts by its absolute error again
     release_layout: read the patch as the release does, which takes its [n, P, P, 3] for channels
         first: the window then spans columns and colours of one row of pixels, zeros around them.
         It makes the term 4 to 5 times weaker
@@ -41,17 +47,19 @@ class L1Dssim:
     k1: float = 0.01
     k2: float = 0.03
     data_range: float = 1.0
+    relative_weight: float = 0.0
+    relative_offset: float = 0.03
     release_layout: bool = False
 
     def __post_init__(self) -> None:
-        for name in ("l1_weight", "dssim_weight"):
+        for name in ("l1_weight", "dssim_weight", "relative_weight"):
             if getattr(self, name) < 0:
                 raise ValueError(f"loss.{name} is {getattr(self, name)}: it cannot be negative")
-        if self.l1_weight == self.dssim_weight == 0:
-            raise ValueError("loss.l1_weight and loss.dssim_weight are both 0: nothing is learned")
+        if self.l1_weight == self.dssim_weight == self.relative_weight == 0:
+            raise ValueError("all weights of the loss are 0 (loss.l1_weight): nothing is learned")
         if self.window_size < 1 or self.window_size % 2 == 0:
             raise ValueError(f"loss.window_size is {self.window_size}: it must be odd and positive")
-        for name in ("sigma", "k1", "k2", "data_range"):
+        for name in ("sigma", "k1", "k2", "data_range", "relative_offset"):
             if getattr(self, name) <= 0:
                 raise ValueError(f"loss.{name} is {getattr(self, name)}: it must be above 0")
 
@@ -71,7 +79,16 @@ class L1Dssim:
             l1 = (prediction - target).abs().mean(dim=(1, 2, 3))
             dssim = (1 - self._ssim(self._planes(prediction), self._planes(target))) / 2
             # Rounding can take SSIM above 1 by 1e-7, and samples are drawn in proportion to this.
-            return self.l1_weight * l1 + self.dssim_weight * dssim.clamp_min(0)
+            loss = self.l1_weight * l1 + self.dssim_weight * dssim.clamp_min(0)
+            if self.relative_weight:
+                difference = self._log(prediction) - self._log(target)
+                loss = loss + self.relative_weight * difference.abs().mean(dim=(1, 2, 3))
+            return loss
+
+    def _log(self, log1p_radiance: Tensor) -> Tensor:
+        """log(r + relative_offset), also where r itself would overflow; of negative r that of 0."""
+        above = log1p_radiance.clamp_min(0)
+        return above + ((self.relative_offset - 1) * (-above).exp()).log1p()
 
     def _planes(self, image: Tensor) -> Tensor:
         """[n, planes, height, width]: the images the window slides over."""

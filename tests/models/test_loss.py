@@ -1,3 +1,6 @@
+import math
+
+import numpy as np
 import pytest
 import torch
 import torch.nn.functional as F
@@ -91,6 +94,39 @@ def test_computed_in_float32_under_autocast() -> None:
     assert torch.equal(rounded, DSSIM(prediction.bfloat16().float(), target))
 
 
+@pytest.mark.parametrize("offset", [0.03, 1.0, 2.5])
+def test_relative_term_by_hand(offset) -> None:
+    prediction, target = images(3, 16, 16, 3)
+    loss = L1Dssim(l1_weight=0, dssim_weight=0, relative_weight=2, relative_offset=offset)
+    wanted, given = (
+        np.log(np.expm1(x.clamp(min=0).numpy()) + offset) for x in (target, prediction)
+    )
+    expected = 2 * np.abs(given - wanted).mean(axis=(1, 2, 3))
+    torch.testing.assert_close(loss(prediction, target), torch.from_numpy(expected))
+
+
+def test_half_the_light_is_missed_as_much_in_the_dark_as_in_the_bright() -> None:
+    loss = L1Dssim(l1_weight=0, dssim_weight=0, relative_weight=1, relative_offset=1e-5)
+    radiance = torch.tensor([0.01, 1.0, 1000.0])[:, None, None, None].expand(3, 11, 11, 3)
+    torch.testing.assert_close(
+        loss((radiance / 2).log1p(), radiance.log1p()),
+        torch.full((3,), math.log(2)),
+        rtol=0.01,
+        atol=0,
+    )
+
+
+def test_relative_term_of_radiance_that_overflows_is_finite() -> None:
+    loss = L1Dssim(l1_weight=0, dssim_weight=0, relative_weight=1)
+    prediction = torch.full((1, 11, 11, 3), 200.0, requires_grad=True)  # log1p radiance
+    value = loss(prediction, torch.full((1, 11, 11, 3), 190.0))
+    value.sum().backward()
+    assert value.item() == pytest.approx(10)
+    assert prediction.grad is not None
+    assert prediction.grad.sum().item() == pytest.approx(1)
+    assert torch.isfinite(loss(torch.zeros(1, 11, 11, 3), torch.zeros(1, 11, 11, 3))).all()
+
+
 def release_loss(prediction, target):
     """2·L1 + (1 − SSIM) with zero-padded convolutions over [n, P, P, 3] read as channels first."""
     window = torch.exp(-((torch.arange(11, dtype=torch.float64) - 5) ** 2) / (2 * 1.5**2))
@@ -123,10 +159,12 @@ def test_the_releases_loss() -> None:
     [
         ({"l1_weight": -1}, "loss.l1_weight is -1"),
         ({"dssim_weight": -2}, "loss.dssim_weight is -2"),
-        ({"l1_weight": 0, "dssim_weight": 0}, "both 0"),
+        ({"relative_weight": -3}, "loss.relative_weight is -3"),
+        ({"l1_weight": 0, "dssim_weight": 0}, "all weights of the loss are 0"),
         ({"window_size": 10}, "loss.window_size is 10"),
         ({"sigma": 0}, "loss.sigma is 0"),
         ({"data_range": -1}, "loss.data_range is -1"),
+        ({"relative_offset": 0}, "loss.relative_offset is 0"),
     ],
 )
 def test_bad_options_are_named(options, message) -> None:
