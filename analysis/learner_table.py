@@ -15,10 +15,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from analysis.parts_of_frames import frames_table
+from analysis.parts_of_learner import parts_table
 from analysis.readme_table import between_markers, markdown_row
 from analysis.runs import METRICS
 
@@ -31,7 +31,6 @@ MINUTE = Path("docs/learner/minute.csv")
 OF_MINUTE = ("<!-- minute: written by analysis.learner_table -->", "<!-- end of minute -->")
 FRAMES = Path("docs/learner/frames.json")
 OF_FRAMES = ("<!-- frames: written by analysis.learner_table -->", "<!-- end of frames -->")
-OURS, PAPER = "ours", "active_exploration"
 
 METHODS = {
     "ours": "ours",
@@ -66,35 +65,6 @@ def learner_table(results: pd.DataFrame, metrics: Sequence[str], methods: Sequen
         shown = shown.where(errors.ne(errors.min(axis=1), axis=0), "**" + shown + "**")
         seeds = len(str(rows.loc[(scene, methods[0]), "seeds"]).split())
         lines.append(markdown_row([scene, str(seeds), *(" / ".join(shown[m]) for m in methods)]))
-    return "\n".join(lines)
-
-
-def parts_table(results: pd.DataFrame) -> str:
-    """A row per scene and part: the error without it and with it alone, against the wholes.
-
-    results: the report's table of results on `sweeps/learner`. Errors are geometric means of the
-    four metrics on hard frames; a difference is positive where there is more error. A scene whose
-    two whole methods are not both there, or which has no part, is left out.
-    """
-    error = np.exp(np.log(results[[f"hard_{metric}" for metric in METRICS]]).mean(axis=1))
-    error.index = pd.MultiIndex.from_frame(results[["scene", "method"]])
-    heads = ("scene", "part", "ours without it", "", "the paper's method with it", "")
-    lines = [markdown_row(heads), markdown_row([":--", ":--", "--:", "--:", "--:", "--:"])]
-    for scene in sorted(set(results["scene"])):
-        parts = dict.fromkeys(m.split("/")[1] for m in error[scene].index if "/" in m)
-        if not (parts and {OURS, PAPER} <= set(error[scene].index)):
-            continue
-        wholes = {"ours_without": error[scene, OURS], "paper_with": error[scene, PAPER]}
-        shown = [f"**{wholes['ours_without']:.4f}**", "", f"**{wholes['paper_with']:.4f}**", ""]
-        lines.append(markdown_row([scene, "*the whole method*", *shown]))
-        for part in parts:
-            cells = []
-            for ablation, whole in wholes.items():
-                found = error.get((scene, f"{ablation}/{part}"))
-                cells += (
-                    ["", ""] if found is None else [f"{found:.4f}", f"{found / whole - 1:+.0%}"]
-                )
-            lines.append(markdown_row([scene, part.replace("_", " "), *cells]))
     return "\n".join(lines)
 
 

@@ -172,9 +172,9 @@ def _draw(axes: Axes, panel: ErrorPanel, styles: Mapping[str, dict[str, Any]]) -
             floor, color="#666666", linestyle=(0, (4, 3)), linewidth=1, label="reference noise"
         )
         values = np.append(values, floor)
-    _make_logarithmic(axes, "y", values)
+    make_logarithmic(axes, "y", values)
     if panel.log_time:
-        _make_logarithmic(axes, "x", np.concatenate([curve.seconds for curve in curves]))
+        make_logarithmic(axes, "x", np.concatenate([curve.seconds for curve in curves]))
 
 
 def draw_band(axes: Axes, curve: Curve, *, label: str, color: str, linestyle: Any = "-") -> None:
@@ -199,7 +199,7 @@ def draw_band(axes: Axes, curve: Curve, *, label: str, color: str, linestyle: An
     axes.fill_between(curve.seconds, curve.low, curve.high, color=color, alpha=0.18, linewidth=0)
 
 
-def _make_logarithmic(axes: Axes, direction: Literal["x", "y"], values: np.ndarray) -> None:
+def make_logarithmic(axes: Axes, direction: Literal["x", "y"], values: np.ndarray) -> None:
     """A logarithmic axis with plain numbers at the ticks; left linear where no value is above 0."""
     positive = values[np.isfinite(values) & (values > 0)]
     if not len(positive):

@@ -17,7 +17,6 @@ from analysis.learner_table import (
     PAGES,
     RESULTS,
     learner_table,
-    parts_table,
     with_frames,
     with_minute,
     with_parts,
@@ -92,26 +91,6 @@ def test_frames_have_a_row_per_scene_and_resolution() -> None:
     ]
     with pytest.raises(ValueError, match="box, 256 pixels: 'ours / paths and denoiser' was not"):
         frames_table(figures[:3])
-
-
-def test_parts_are_compared_with_the_whole_that_they_belong_to() -> None:
-    rows = [
-        {"scene": s, "method": m, "hard_mape": e, "hard_dssim": e, "hard_mae": e, "hard_lpips": e}
-        for s, m, e in (
-            ("box", "ours", 0.1),
-            ("box", "active_exploration", 0.4),
-            ("box", "ours_without/big_steps", 0.12),
-            ("box", "paper_with/big_steps", 0.3),
-            ("box", "paper_with/more", 0.5),
-            ("half", "ours", 0.1),
-        )
-    ]
-    rows[0] |= {"hard_mape": 0.2, "hard_dssim": 0.05}  # the same geometric mean
-    assert parts_table(pd.DataFrame(rows)).splitlines()[2:] == [
-        "| box | *the whole method* | **0.1000** |  | **0.4000** |  |",
-        "| box | big steps | 0.1200 | +20% | 0.3000 | -25% |",
-        "| box | more |  |  | 0.5000 | +25% |",
-    ]
 
 
 def results(**errors: tuple[float, float]) -> pd.DataFrame:
