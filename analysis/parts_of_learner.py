@@ -28,12 +28,14 @@ from analysis.plots import (
 from analysis.readme_table import markdown_row
 from analysis.runs import METRICS, Run, find_runs
 from analysis.speedup import log_error_series
-from ngi.files.durable import write_atomically
 
 ABLATIONS = {  # of a whole method: prefix of its runs, caption
     "ours": ("ours_without", "taken out of ours"),
     "active_exploration": ("paper_with", "added to the paper's method"),
 }
+
+OTHER_NAMES = {"ours_uniform": "ours_without/sobol_sequence"}
+"""Methods that leave a part out and are not named after it."""
 
 NAMED = 4
 """Parts of each ablation that have a colour in the picture, those of the largest effect."""
@@ -50,8 +52,9 @@ def errors_by_part(results: pd.DataFrame, whole: str) -> pd.DataFrame:
     """
     prefix, _ = ABLATIONS[whole]
     error = np.exp(np.log(results[[f"hard_{metric}" for metric in METRICS]]).mean(axis=1))
-    parts = results["method"].str.removeprefix(f"{prefix}/").mask(results["method"] == whole, "")
-    named = results["method"].eq(whole) | results["method"].str.startswith(f"{prefix}/")
+    methods = results["method"].replace(OTHER_NAMES)
+    parts = methods.str.removeprefix(f"{prefix}/").mask(methods == whole, "")
+    named = methods.eq(whole) | methods.str.startswith(f"{prefix}/")
     table = pd.DataFrame({"scene": results["scene"], "part": parts, "error": error})[named]
     table = table.pivot(index="part", columns="scene", values="error")
     if "" not in table.index:
@@ -99,7 +102,8 @@ def draw(runs: Sequence[Run]) -> bytes:
 
     runs: of `sweeps/learner`, one seed. Raises ValueError where a whole method is missing.
     """
-    by_name = {(run.scene, run.label["method"]): run for run in runs}
+    methods = [OTHER_NAMES.get(run.label["method"], run.label["method"]) for run in runs]
+    by_name = {(run.scene, name): run for run, name in zip(runs, methods, strict=True)}
     ends = [{"scene": scene, "method": name, **_errors(r)} for (scene, name), r in by_name.items()]
     tables = {whole: errors_by_part(pd.DataFrame(ends), whole) for whole in ABLATIONS}
     if missing := [whole for whole, table in tables.items() if table.empty]:
@@ -159,7 +163,7 @@ def main() -> int:
         print(__doc__, file=sys.stderr)
         return 2
     try:
-        write_atomically(Path(sys.argv[2]), draw(find_runs(Path(sys.argv[1]))[0]))
+        Path(sys.argv[2]).write_bytes(draw(find_runs(Path(sys.argv[1]))[0]))
     except (OSError, ValueError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 1

@@ -23,6 +23,7 @@ def ablation() -> pd.DataFrame:
         ("box", "paper_with/more", 0.5),
         ("hall", "ours", 0.2),
         ("hall", "ours_without/small_steps", 0.3),
+        ("hall", "ours_uniform", 0.18),
         ("alone", "ours", 0.1),
         ("partial", "ours_without/small_steps", 0.3),
     )
@@ -38,6 +39,7 @@ def test_parts_are_compared_with_the_whole_that_they_belong_to() -> None:
         "| *nothing* | **0.1000** | **0.2000** |  |",
         "| small steps | 0.1100 (+10%) | 0.3000 (+50%) | +28% |",
         "| big steps | 0.1200 (+20%) |  | +20% |",
+        "| sobol sequence |  | 0.1800 (-10%) | -10% |",
         "",
         "| added to the paper's method | box | all of them |",
         "| :-- | --: | --: |",
