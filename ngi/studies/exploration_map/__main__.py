@@ -7,6 +7,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from ngi.studies.exploration_map.plan import PLANS
+
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs the map; returns the exit status."""
@@ -22,9 +24,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     parser.add_argument(
         "--settings",
-        choices=("smoke", "full", "ours", "known_500", "known_2000"),
+        choices=PLANS,
         default="full",
         help="default: full; ours: uniform sampling and predicted losses with our learner; "
+        "ours_long: in 4,000 steps, of losses without noise; "
         "known_…: and a sampler that knows where the rare is, over so many steps",
     )
     parser.add_argument("--seeds", type=int, nargs="+", default=[0, 1, 2, 3, 4], metavar="SEED")
@@ -34,7 +37,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = parser.parse_args(argv)
 
     from ngi.studies.exploration_map.campaign import run_all  # PyTorch takes seconds
-    from ngi.studies.exploration_map.plan import PLANS
 
     try:
         table = run_all(

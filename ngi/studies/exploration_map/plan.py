@@ -57,6 +57,10 @@ OUR_LEARNER = ("optimizer=muon", "schedule=warmup_stable_decay", "averaging=expo
 """Of `method=ours`, all that does not concern the samples or what the network sees of them."""
 
 
+NOISE_KNOWN = "+data.halves=true"
+"""Each patch is the mean of two renderings: predictions are made of losses without its noise."""
+
+
 def _ours() -> tuple[Setting, ...]:
     """Where exploration pays by the full map: volume, dimensions and noise, each alone."""
     return (
@@ -93,5 +97,13 @@ PLANS = {
         frames=400,
         methods=OURS,
         learner=OUR_LEARNER,
+    ),
+    "ours_long": Plan(
+        settings=(*_ours(), replace(BASE, volume=0.1), _in_dimensions(2, BASE.volume)),
+        steps=4000,
+        evaluations=40,
+        frames=400,
+        methods=OURS,
+        learner=(*OUR_LEARNER, NOISE_KNOWN),
     ),
 }

@@ -23,8 +23,8 @@ from ngi.studies.exploration_map.setting import KNOWN, KNOWN_SHARE, Method, Sett
 from ngi.studies.exploration_map.test_set import TestSet
 
 PARTS = (
-    *("sampler", "reuse", "resolution", "model", "loss", "optimizer", "schedule", "averaging"),
-    "renderer",
+    *("data", "sampler", "reuse", "resolution", "model", "loss", "optimizer", "schedule"),
+    *("averaging", "renderer"),
 )
 """Of the program's configuration, that a run of the map is built from."""
 
