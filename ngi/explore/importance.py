@@ -11,10 +11,14 @@ from torch import Tensor
 class Importance:
     """A defensive mixture over m candidates (Hesterberg 1995): of uniform and of valued ones,
 
-        p_i = α / m + (1 - α) · value_i^power / Σ_j value_j^power.
+        p_i = α / m + (1 - α) · value_i^power / Σ_j value_j^power,
+
+    and what exceeds R / m of it goes to the others, in proportion to what each lacks of R / m.
 
     uniform_share: α, in [0, 1]; 1 is the uniform density. As p_i >= α / m, no weight exceeds 1 / α
     power: of the values, above 0
+    largest_ratio: R, at least 1; no candidate is drawn more than so many times as often as by
+        uniform draws. What is too rare for a share of the draws does not get it all the same
     weighted: whether losses are weighted back to uniform candidates; else what is drawn often
         counts often
     Raises ValueError for numbers outside these ranges, and for weights without a bound (α = 0).
@@ -22,6 +26,7 @@ class Importance:
 
     uniform_share: float
     power: float = 1.0
+    largest_ratio: float = math.inf
     weighted: bool = False
 
     def __post_init__(self) -> None:
@@ -29,6 +34,8 @@ class Importance:
             raise ValueError(f"uniform_share: {self.uniform_share}: give a number in [0, 1]")
         if not 0 < self.power < math.inf:
             raise ValueError(f"power: {self.power}: give a number above 0")
+        if not self.largest_ratio >= 1:
+            raise ValueError(f"largest_ratio: {self.largest_ratio}: give a number of at least 1")
         if self.weighted and self.uniform_share == 0:
             raise ValueError(
                 "uniform_share: 0 with weighted: true: the weights would have no bound; give a "
@@ -49,7 +56,18 @@ class Importance:
         if largest == 0:
             return uniform
         valued = (values / largest) ** self.power
-        return self.uniform_share * uniform + (1 - self.uniform_share) * valued / valued.sum()
+        mixed = self.uniform_share * uniform + (1 - self.uniform_share) * valued / valued.sum()
+        return self._bounded(mixed)
+
+    def _bounded(self, probabilities: Tensor) -> Tensor:
+        """No entry above R / m, and their sum as it was: [m] to [m]."""
+        largest = min(self.largest_ratio / len(probabilities), 1.0)
+        bounded = probabilities.clamp(max=largest)
+        excess = (probabilities - bounded).sum()
+        if excess == 0:
+            return probabilities
+        room = largest - bounded
+        return bounded + excess * room / room.sum()
 
     def weights(self, probabilities: Tensor) -> Tensor:
         """1 / (m p_i) where `weighted`, else 1: factors of the losses, [m] float64."""

@@ -1,7 +1,9 @@
+import math
+
 import numpy as np
 import pytest
 import torch
-from scipy import stats
+from scipy import optimize, stats
 
 from ngi.explore import Importance
 
@@ -13,6 +15,24 @@ def test_the_density_is_the_mixture_of_its_formula() -> None:
     squares = np.array([0.0, 1.0, 4.0, 25.0])
     expected = 0.2 / 4 + 0.8 * squares / squares.sum()
     np.testing.assert_allclose(found.numpy(), expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("ratio", [1.0, 1.2, 2.0, 2.8])
+def test_nothing_is_drawn_more_often_than_the_bound(ratio: float) -> None:
+    """Mixed with so much of the uniform density as is missing, found here by bisection."""
+    mixed = Importance(uniform_share=0.2, power=2.0).probabilities(VALUES).numpy()
+    found = Importance(uniform_share=0.2, power=2.0, largest_ratio=ratio).probabilities(VALUES)
+    capped = np.minimum(mixed, ratio / 4)
+    share = optimize.brentq(lambda x: (capped + x * (ratio / 4 - capped)).sum() - 1, 0, 1)
+    np.testing.assert_allclose(found.numpy(), capped + share * (ratio / 4 - capped), rtol=1e-9)
+    assert found.max().item() <= ratio / 4 + 1e-12
+    assert found.sum().item() == pytest.approx(1, abs=1e-12)
+    assert found.min().item() >= 0.2 / 4
+
+
+def test_a_bound_that_nothing_reaches_changes_no_bit() -> None:
+    plain, bounded = (Importance(uniform_share=0.2, largest_ratio=r) for r in (math.inf, 3.0))
+    assert torch.equal(plain.probabilities(VALUES), bounded.probabilities(VALUES))
 
 
 def test_weights_undo_the_density_and_are_bounded() -> None:
@@ -76,6 +96,8 @@ def test_tiny_and_huge_values_keep_their_proportion() -> None:
         ({"uniform_share": 1.5}, "uniform_share: 1.5"),
         ({"uniform_share": float("nan")}, "uniform_share: nan"),
         ({"uniform_share": 0.5, "power": 0.0}, "power: 0.0"),
+        ({"uniform_share": 0.5, "largest_ratio": 0.9}, "largest_ratio: 0.9"),
+        ({"uniform_share": 0.5, "largest_ratio": float("nan")}, "largest_ratio: nan"),
         ({"uniform_share": 0.0, "weighted": True}, "no bound"),
     ],
 )
