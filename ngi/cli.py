@@ -4,6 +4,7 @@ A verb is a module with a function `main`, which is imported when its verb is as
 --help` waits for neither PyTorch nor Mitsuba.
 """
 
+import os
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -68,6 +69,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     arguments: those of the command line where None
     """
+    try:
+        status = _run(arguments)
+        sys.stdout.flush()
+    except BrokenPipeError:  # `ngi … | head`: who reads it has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # flushed again at the end
+        return 1
+    return status
+
+
+def _run(arguments: Sequence[str] | None) -> int:
     name, *rest = [*(sys.argv[1:] if arguments is None else arguments)] or [""]
     if name in ("-h", "--help"):
         print(overview())

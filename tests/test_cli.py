@@ -1,5 +1,6 @@
 """`ngi VERB`: one way in, quick to answer, with errors that name the command."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -50,6 +51,21 @@ def test_without_a_verb_the_way_is_shown_as_an_error(capsys: pytest.CaptureFixtu
 def test_a_wrong_verb_names_the_nearest(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["trian", "scene=mirror"]) == 2
     assert "no 'trian'; did you mean 'ngi train'?" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("verb", ["train", "describe"])
+def test_a_reader_that_has_seen_enough_is_told_nothing(verb: str) -> None:
+    """As of `ngi train --help | head`: of Hydra's output and of argparse's."""
+    command = [sys.executable, "-m", "ngi", verb, "--help"]
+    reading, writing = os.pipe()
+    os.close(reading)
+    try:
+        answer = subprocess.run(
+            command, stdout=writing, stderr=subprocess.PIPE, text=True, cwd=ROOT
+        )
+    finally:
+        os.close(writing)
+    assert (answer.returncode, answer.stderr) == (1, "")
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:

@@ -79,6 +79,8 @@ def run_program(program: Callable[[], None]) -> None:
         program()
     except (CompactHydraException, OmegaConfBaseException) as error:
         sys.exit(explained(error))
+    except BrokenPipeError:  # of what is printed, no folder's
+        raise
     except (OSError, ValueError) as error:  # where Hydra makes the folder, or its log in there
         if str(error).startswith("Only one of --run"):
             sys.exit(f"{error}; the settings of one run of a sweep: without -m, --cfg job")
