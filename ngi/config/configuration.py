@@ -17,7 +17,7 @@ import ngi
 from ngi.config.build import plain
 from ngi.files.resources import cache_folder, root
 from ngi.machine.precision import fast_precision
-from ngi.machine.size import bootstrap_batches, network_depth, network_width
+from ngi.machine.size import bootstrap_batches, network_depth, network_width, warmup_steps
 from ngi.scene import scenes
 
 LONGEST = 100
@@ -67,6 +67,7 @@ RESOLVERS: dict[str, Callable[..., Any]] = {
     "network_width": network_width,
     "network_depth": network_depth,
     "bootstrap_batches": bootstrap_batches,
+    "warmup_steps": warmup_steps,
     "folder_name": lambda path: Path(path).name,
     "absolute_path": lambda *parts: str(Path(*parts).absolute()),
     "cache_folder": lambda: str(cache_folder()),

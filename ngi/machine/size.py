@@ -6,6 +6,9 @@ SECONDS_PER_BATCH = 15.0
 MOST_BATCHES = 4
 """Rendered before the first is reused, however long the budget."""
 
+WARMUP_STEPS = 30
+"""Of the learning rate, where the budget has room for them."""
+
 
 def network_width() -> int:
     """Features of a hidden layer: 512 on a GPU (paper, Sec. 4.2), 128 on a processor."""
@@ -25,6 +28,14 @@ def bootstrap_batches(seconds: float | None) -> int:
     if seconds is None:
         return MOST_BATCHES
     return max(1, min(MOST_BATCHES, int(seconds / SECONDS_PER_BATCH)))
+
+
+def warmup_steps(steps: int | None) -> int:
+    """Over how many steps the learning rate rises: a quarter of a budget too short for 30.
+
+    steps: of the budget; None for a budget in seconds
+    """
+    return WARMUP_STEPS if steps is None or steps > WARMUP_STEPS else steps // 4
 
 
 def _has_gpu() -> bool:

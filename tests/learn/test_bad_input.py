@@ -51,7 +51,7 @@ def test_an_error_of_the_command_line_ends_it(
         (["optimizer.lr=-1"], ["learning rate", "-1"]),
         (["optimizer=muon", "optimizer.momentum=1"], ["optimizer.momentum: 1"]),
         (
-            ["schedule=warmup_stable_decay", "budget.steps=12"],
+            ["schedule=warmup_stable_decay", "schedule.warmup_steps=30", "budget.steps=12"],
             ["schedule.warmup_steps: 30", "budget.steps: 12", "schedule.warmup_steps=3"],
         ),
         (["averaging=exponential", "averaging.decay=1"], ["averaging.decay: 1"]),

@@ -3,7 +3,8 @@
 import pytest
 import torch
 
-from ngi.machine.size import bootstrap_batches, network_depth, network_width
+from ngi.config.configuration import composed
+from ngi.machine.size import bootstrap_batches, network_depth, network_width, warmup_steps
 
 
 @pytest.mark.parametrize(
@@ -11,6 +12,16 @@ from ngi.machine.size import bootstrap_batches, network_depth, network_width
 )
 def test_the_bootstrap_is_a_share_of_the_budget(seconds: float | None, batches: int) -> None:
     assert bootstrap_batches(seconds) == batches
+
+
+@pytest.mark.parametrize(
+    ("steps", "warmup"), [(None, 30), (31, 30), (1400, 30), (30, 7), (12, 3), (1, 0)]
+)
+def test_the_warm_up_fits_into_the_budget(steps: int | None, warmup: int) -> None:
+    assert warmup_steps(steps) == warmup
+    assert (
+        composed("method=ours", f"+budget.steps={steps or 'null'}").schedule.warmup_steps == warmup
+    )
 
 
 @pytest.mark.parametrize(("gpu", "size"), [(True, (8, 512)), (False, (6, 128))])
