@@ -3,7 +3,8 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-SWEEPS := same_time preconditioning resolution target_function acceptance histogram dimensions specular chess cnsr anf denoising sampling
+SWEEPS := same_time preconditioning resolution target_function acceptance histogram dimensions specular chess cnsr anf denoising sampling \
+	ours_same_time ours_target_function ours_acceptance ours_dimensions
 BUDGET ?= small
 OPTIONS ?=
 SCENE ?= living-room

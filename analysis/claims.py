@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 SEVEN_SCENES = (
@@ -56,7 +56,7 @@ class Claim:
         return f"python -m ngi.train -m +sweeps={self.id} budget=small"
 
 
-CLAIMS = (
+_OF_THE_PAPER = (
     Claim(
         id="same_time",
         title="Active Exploration against uniform sampling",
@@ -182,3 +182,39 @@ CLAIMS = (
         primary="finding",
     ),
 )
+
+WITH_OURS = {
+    "active_exploration": "ours_exploring",
+    "uniform": "ours_uniform",
+    "loss_target": "ours_loss_target",
+    "metropolis": "ours_metropolis",
+}
+"""Methods of the paper, and what is the same with our learner."""
+
+
+def _with_ours(claim: Claim) -> Claim:
+    """The same claim of the same samplings with our learner, as far as it has them."""
+    return replace(
+        claim,
+        id=f"ours_{claim.id}",
+        title=f"{claim.title}, with our learner",
+        comparisons=tuple(
+            replace(
+                comparison, better=WITH_OURS[comparison.better], worse=WITH_OURS[comparison.worse]
+            )
+            for comparison in claim.comparisons
+            if WITH_OURS.keys() >= {comparison.better, comparison.worse}
+        ),
+    )
+
+
+CLAIMS = (
+    *_OF_THE_PAPER,
+    *(
+        _with_ours(claim)
+        for claim in _OF_THE_PAPER
+        if claim.id in ("same_time", "target_function", "acceptance", "dimensions")
+    ),
+)
+"""What the paper says of samplings is judged with its learner and with ours: all but what concerns
+its network, its resolution or other programs."""

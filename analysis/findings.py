@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pandas as pd
 
-from analysis.claims import SALONS, SEVEN_SCENES
+from analysis.claims import SALONS, SEVEN_SCENES, WITH_OURS
 from analysis.evidence import EQUIVALENCE, Finding, Verdict, decide
 from analysis.pairs import (
     log_error,
@@ -27,15 +28,18 @@ from analysis.target_map import histogram_distances
 METHOD = "active_exploration"
 
 
-def benefit_against_dimensions(runs: Sequence[Run]) -> list[Finding]:
+def benefit_against_dimensions(
+    runs: Sequence[Run], exploration: str = METHOD, uniform: str = "uniform"
+) -> list[Finding]:
     """Slope of the log ratio exploration / uniform on hard frames over log2 of the variables.
 
+    exploration, uniform: the methods that are compared
     Least squares over the Salons that were run; every Salon's seeds and frames are resampled.
     Inconclusive until all five were run.
     """
     dimensions, samples = [], []
     for salon in SALONS:
-        if pairs := pair_runs(runs, salon, METHOD, "uniform"):
+        if pairs := pair_runs(runs, salon, exploration, uniform):
             both = [run for pair in pairs for run in (pair.better, pair.worse)]
             ratios = log_ratios(pairs, "hard", shared_metrics(both, "hard"))
             dimensions.append(np.log2(int(salon.removeprefix("salon-"))))
@@ -184,6 +188,11 @@ def _percent_finding(
 FINDINGS: Mapping[str, Callable[[Sequence[Run]], list[Finding]]] = {
     "histogram": histogram_follows_target,
     "dimensions": benefit_against_dimensions,
+    "ours_dimensions": partial(
+        benefit_against_dimensions,
+        exploration=WITH_OURS["active_exploration"],
+        uniform=WITH_OURS["uniform"],
+    ),
     "specular": error_still_falls,
     "chess": many_variables_are_plausible,
 }

@@ -4,7 +4,7 @@ import pytest
 import yaml
 
 from analysis.claim_tables import claims_table
-from analysis.claims import CLAIMS
+from analysis.claims import CLAIMS, SALONS
 from analysis.methods import TITLES, name_methods
 from analysis.runs import find_runs
 from analysis.verdicts import ALL_SCENES, ClaimResult, Verdict, judge
@@ -64,6 +64,22 @@ def test_scenes_are_judged_one_by_one_and_together(make_method, tmp_path) -> Non
     text = f"Active Exploration against Metropolis acceptance on 2 scenes: {numbers}"
     assert text in result.sentence
     assert "less on 2 of them" in result.sentence
+
+
+def test_each_learner_is_judged_by_its_own_runs(make_method, tmp_path) -> None:
+    for seed in range(3):
+        for salon in SALONS:
+            error = 0.1 * int(salon.split("-")[1]) ** -0.2
+            make_method("ours_exploring", scene=salon, seed=seed, error=error)
+            make_method("ours_uniform", scene=salon, seed=seed)
+        for scene in ("sphere-caustic", "living-room"):
+            make_method("ours_exploring", scene=scene, seed=seed, error=0.05)
+            make_method("ours_metropolis", scene=scene, seed=seed)
+    results = judged(tmp_path)
+    verdicts = {name: result.verdict for name, result in results.items()}
+    assert verdicts["acceptance"] is verdicts["dimensions"] is Verdict.NOT_RUN
+    assert verdicts["ours_acceptance"] is verdicts["ours_dimensions"] is Verdict.REPRODUCED
+    assert "ours with chains and Metropolis acceptance" in results["ours_acceptance"].sentence
 
 
 def test_a_missing_scene_leaves_the_claim_open(make_method, tmp_path) -> None:

@@ -11,6 +11,7 @@ from hydra.core.hydra_config import HydraConfig
 from hydra.utils import instantiate
 from omegaconf import DictConfig, open_dict
 
+from analysis.claims import WITH_OURS
 from ngi.config.configuration import register
 from ngi.explore import MarkovChains, PredictedLoss
 from ngi.files.resources import root, scene_folders
@@ -94,7 +95,12 @@ def test_a_size_has_adams_rate_and_leaves_others_alone(size: str, rate: float) -
 PRECONDITIONED, PLAIN = "pixel_generator", "pixel_generator_no_preconditioning"
 COMPETITORS = ("cnsr", "anf")
 """Other methods, whose samples are of another size."""
-OURS = ("ours", "ours_uniform")
+EXPLORING = {
+    "ours_exploring": "mcmc_loss_step",
+    "ours_loss_target": "mcmc_loss",
+    "ours_metropolis": "mcmc_metropolis",
+}
+OURS = ("ours", "ours_uniform", *EXPLORING)
 LIGHT = ["specular", "direct and caustics"]
 METHODS = {  # sampler, resolution, model, what the renderer traces into the buffers
     "active_exploration": ("mcmc_loss_step", "growing", PRECONDITIONED, []),
@@ -114,6 +120,10 @@ METHODS = {  # sampler, resolution, model, what the renderer traces into the buf
     "traced_specular": ("mcmc_loss_step", "growing", PRECONDITIONED, ["specular"]),
     "ours": ("sobol", "constant", "encoded_generator", LIGHT),
     "ours_uniform": ("uniform", "constant", "encoded_generator", LIGHT),
+    **{
+        method: (sampler, "constant", "encoded_generator", LIGHT)
+        for method, sampler in EXPLORING.items()
+    },
     "traced_direct": ("mcmc_loss_step", "growing", PRECONDITIONED, ["direct"]),
 }
 PRIORITISED = {"_target_": "ngi.reuse.Prioritised", "alpha": 0.6, "beta": 0.4, "epsilon": 1e-6}
@@ -298,6 +308,20 @@ def test_an_ablation_of_the_learner_changes_one_part(ablation: str, base: str) -
         assert [key for key in CHANGED.values() if config[key] != whole[key]] == [
             key for key in CHANGED.values() if key == group
         ], part
+
+
+@pytest.mark.parametrize(("of_the_paper", "of_ours"), WITH_OURS.items())
+def test_claims_are_judged_with_the_same_samplings_and_our_learner(
+    of_the_paper: str, of_ours: str
+) -> None:
+    """The paper's sampler, but for the number of its chains; all else is that of ours."""
+    paper, ours, learner = (
+        composed("budget=small", f"method={method}") for method in (of_the_paper, of_ours, "ours")
+    )
+    assert ours.sampler == {**paper.sampler, "chains": learner.sampler.chains}
+    parts = ("model", "loss", "optimizer", "schedule", "averaging", "data", "renderer", "reuse")
+    for part in (*parts, "resolution", "budget"):
+        assert ours[part] == learner[part]
 
 
 def test_runs_that_two_sweeps_need_are_one_run() -> None:
