@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from hydra.utils import instantiate
-from omegaconf import DictConfig, OmegaConf
+from omegaconf import DictConfig
 
 from ngi import learn
 from ngi.config.build import build_module, build_samples, build_stream, plain
@@ -40,7 +40,8 @@ def configuration(method: Method, learner: tuple[str, ...] = ()) -> DictConfig:
 
 def plain_configuration(method: Method, learner: tuple[str, ...] = ()) -> dict[str, Any]:
     """The parts of it that a run is built from, as plain data."""
-    return plain(OmegaConf.masked_copy(configuration(method, learner), list(PARTS)))
+    config = configuration(method, learner)
+    return {part: plain(config[part]) for part in PARTS}
 
 
 @lru_cache(maxsize=1)
