@@ -20,7 +20,7 @@ from analysis.plots import STYLE, new_figure, save_figure
 PAIRS = (("dimensions", "volume"), ("noise", "volume"), ("cost_ratio", "volume"))
 """Knobs along the columns and the rows of each map."""
 
-REUSE = {False: "every batch new", True: "self-tuning reuse"}
+REUSE = {False: "every batch new", True: "with reuse"}
 
 LARGEST = 4.0
 """Ratio at which the colours end."""

@@ -1,6 +1,7 @@
 """A regression forest: what a value is, on average, where samples of it are near."""
 
 from dataclasses import dataclass
+from typing import Self
 
 import torch
 from torch import Tensor
@@ -11,26 +12,37 @@ PRIOR = 2.0
 
 @dataclass(frozen=True)
 class Forest:
-    """T trees of `depth` levels; node k of a level has the children 2 k and 2 k + 1.
+    """T trees of `depth` levels; node k, the root being 0, has the children 2 k + 1 and 2 k + 2.
 
     Points at or above a node's threshold go to its second child; a node that does not split has the
     threshold infinity.
 
-    feature: per level, [T, nodes] int64; threshold: per level, [T, nodes]
+    feature: [T, 2^depth - 1] int64; threshold: [T, 2^depth - 1]
     leaf: [T, 2^depth], mean value
     """
 
-    feature: tuple[Tensor, ...]
-    threshold: tuple[Tensor, ...]
+    feature: Tensor
+    threshold: Tensor
     leaf: Tensor
+
+    @classmethod
+    def flat(cls, *, trees: int, depth: int) -> Self:
+        """One that knows nothing: 1 everywhere."""
+        nodes = 2**depth - 1
+        return cls(
+            feature=torch.zeros(trees, nodes, dtype=torch.int64),
+            threshold=torch.full((trees, nodes), torch.inf),
+            leaf=torch.ones(trees, nodes + 1),
+        )
 
     def __call__(self, points: Tensor) -> Tensor:
         """Mean of the trees' values at n points [n, S], [n]."""
+        inner = self.feature.shape[1]
         node = torch.zeros(len(self.leaf), len(points), dtype=torch.int64)
-        for feature, threshold in zip(self.feature, self.threshold, strict=True):
-            coordinate = points.T.gather(0, feature.gather(1, node))
-            node = 2 * node + (coordinate >= threshold.gather(1, node))
-        return self.leaf.gather(1, node).mean(dim=0)
+        for _ in range((inner + 1).bit_length() - 1):
+            coordinate = points.T.gather(0, self.feature.gather(1, node))
+            node = 2 * node + 1 + (coordinate >= self.threshold.gather(1, node))
+        return self.leaf.gather(1, node - inner).mean(dim=0)
 
 
 def grow(
@@ -66,7 +78,7 @@ def grow(
         thresholds.append(chosen)
     count, total = _sums(values, node, 2**depth)
     mean = (total + PRIOR * values.mean()) / (count + PRIOR)
-    return Forest(tuple(features), tuple(thresholds), mean)
+    return Forest(torch.cat(features, dim=1), torch.cat(thresholds, dim=1), mean)
 
 
 def _thresholds(columns: Tensor, node: Tensor, nodes: int, generator: torch.Generator) -> Tensor:

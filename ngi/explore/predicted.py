@@ -8,10 +8,13 @@ import torch
 from torch import Tensor
 
 from ngi.explore.chains import ChainInfo, ChainState
-from ngi.explore.forest import grow
+from ngi.explore.forest import Forest, grow
 from ngi.explore.importance import Importance
 from ngi.explore.proposals import Proposals
 from ngi.explore.targets import Constant
+
+RENEWED = 8
+"""The forest is grown anew when one in so many of the remembered states is newer than it is."""
 
 
 @dataclass(frozen=True)
@@ -20,10 +23,21 @@ class PredictedState(ChainState):
 
     seen: [m, S], the newest states that were rendered, oldest first
     loss: [m], what each lost when it was new: before the network was trained on it
+    newer: [], how many were seen since the forest was grown
+    feature, threshold, leaf: of the forest
     """
 
     seen: Tensor
     loss: Tensor
+    newer: Tensor
+    feature: Tensor
+    threshold: Tensor
+    leaf: Tensor
+
+    @property
+    def forest(self) -> Forest:
+        """What losses are predicted by."""
+        return Forest(self.feature, self.threshold, self.leaf)
 
 
 class PredictedLoss:
@@ -32,7 +46,8 @@ class PredictedLoss:
     Out of `candidates` uniform states n are drawn, without replacement, with the density that
     `importance` makes of their predicted losses. The prediction is a regression forest through the
     states that were rendered last and their losses as they were new, which is what states that the
-    network has not met would lose: nothing is rendered for it, and the network is not asked.
+    network has not met would lose: nothing is rendered for it, and the network is not asked. A
+    forest serves until an eighth of what is remembered is newer, which is what makes it cheap.
 
     chains: n, states in a batch
     candidates: per batch, at least n
@@ -69,12 +84,19 @@ class PredictedLoss:
         self._candidates = candidates
         self._importance = importance
         self._memory = memory
-        self._forest = {"trees": trees, "depth": depth, "smallest_leaf": smallest_leaf}
+        self._trees = {"trees": trees, "depth": depth, "smallest_leaf": smallest_leaf}
 
     def init(self, state_dimensions: int) -> PredictedState:
         """See `MarkovChains.init`: nothing seen yet."""
-        seen = torch.zeros(0, max(state_dimensions, 0))
-        return PredictedState.empty(self.chains, state_dimensions, seen=seen, loss=torch.zeros(0))
+        forest = Forest.flat(trees=self._trees["trees"], depth=self._trees["depth"])
+        return PredictedState.empty(
+            self.chains,
+            state_dimensions,
+            seen=torch.zeros(0, max(state_dimensions, 0)),
+            loss=torch.zeros(0),
+            newer=torch.tensor(0),
+            **vars(forest),
+        )
 
     def propose(
         self, state: PredictedState, generator: torch.Generator, *, batch: int
@@ -82,22 +104,12 @@ class PredictedLoss:
         """A batch of states, uniform ones as long as fewer than 2 n were seen."""
         shape = self._candidates, state.position.shape[1]
         candidates = torch.empty(shape).uniform_(generator=generator)
-        chosen, weights = self._importance.draw(
-            self.predicted(state, candidates, generator), self.chains, generator
-        )
+        chosen, weights = self._importance.draw(state.forest(candidates), self.chains, generator)
         return Proposals(
             position=candidates[chosen],
             large_step=torch.ones(self.chains, dtype=torch.bool),
             weight=weights.float() if self._importance.weighted else None,
         )
-
-    def predicted(
-        self, state: PredictedState, states: Tensor, generator: torch.Generator
-    ) -> Tensor:
-        """Loss of each of k states [k, S], [k]; the same for all while too few were seen."""
-        if len(state.seen) < 2 * self.chains:
-            return torch.ones(len(states))
-        return grow(state.seen, state.loss, generator, **self._forest)(states)
 
     def accept(
         self,
@@ -112,15 +124,21 @@ class PredictedLoss:
     ) -> tuple[PredictedState, ChainInfo]:
         """Remembers the proposals' losses, [n]; those that are NaN or infinite are forgotten."""
         known = losses.isfinite()
-        seen = torch.cat([state.seen, proposals.position[known]])
-        loss = torch.cat([state.loss, losses[known]])
+        seen = torch.cat([state.seen, proposals.position[known]])[-self._memory :]
+        loss = torch.cat([state.loss, losses[known]])[-self._memory :]
+        newer = state.newer + known.sum()
+        forest = state.forest
+        if len(seen) >= 2 * self.chains and RENEWED * newer >= len(seen):
+            forest, newer = grow(seen, loss, generator, **self._trees), torch.tensor(0)
         moved = replace(
             state,
             position=proposals.position,
             patch=patch_ids,
             age=torch.zeros_like(state.age),
-            seen=seen[-self._memory :],
-            loss=loss[-self._memory :],
+            seen=seen,
+            loss=loss,
+            newer=newer,
+            **vars(forest),
         )
         everywhere = torch.ones(self.chains, dtype=torch.bool)
         return moved, ChainInfo(everywhere, everywhere, ~state.occupied, moved.age)

@@ -126,6 +126,32 @@ def test_the_oldest_and_what_is_not_finite_are_forgotten() -> None:
     assert torch.equal(state.seen[-1], proposals.position[3])
 
 
+def test_a_forest_serves_until_an_eighth_of_what_is_remembered_is_newer() -> None:
+    found = sampler(memory=64)
+    state, generator = found.init(3), torch.Generator().manual_seed(0)
+    seen, newer, grown = [], [], []
+    for batch in range(24):
+        before = state.forest
+        proposals = found.propose(state, generator, batch=batch)
+        losses = torch.rand(CHAINS, generator=generator)
+        state, _ = found.accept(
+            state,
+            proposals,
+            torch.arange(CHAINS),
+            None,
+            torch.zeros(CHAINS),
+            generator,
+            losses=losses,
+        )
+        seen.append(len(state.seen))
+        newer.append(int(state.newer))
+        grown.append(not torch.equal(before.threshold, state.forest.threshold))
+    assert seen == [min(CHAINS * batch, 64) for batch in range(1, 25)]
+    # From 8 states on; 4 are an eighth of up to 32, and 8 of up to 64.
+    assert grown == [False, *[True] * 7, *[False, True] * 8]
+    assert newer == [4, *[0] * 7, *[4, 0] * 8]
+
+
 @pytest.mark.parametrize(
     ("change", "named"),
     [

@@ -100,7 +100,7 @@ def _claim(folder: Path, plan: Plan) -> None:
     made_with = {
         "size": size,
         "scene": PocketRenderer(**BASE.scene, patch_size=1).scene_hash,
-        "configuration": {m.name: plain_configuration(m, plan.learner) for m in plan.methods},
+        "configuration": {m.name: plain_configuration(m, plan) for m in plan.methods},
     }
     file = folder / PROVENANCE
     if file.exists():

@@ -5,7 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from itertools import product
 
-from ngi.studies.exploration_map.setting import AT_MOST, METHODS, OURS, Method, Setting
+from ngi.studies.exploration_map.setting import (
+    AT_MOST,
+    METHODS,
+    OURS,
+    SELF_TUNING,
+    STEADY,
+    Method,
+    Setting,
+)
 
 VOLUMES = (1e-1, 1e-2, 1e-3, 1e-4)
 NOT_RARE = 0.3
@@ -22,6 +30,7 @@ class Plan:
     steps: training steps of a run; evaluations: how often it is tested, evenly
     frames: scene vectors of the test set
     learner: what all runs change in the program's configuration
+    reuse: what those that reuse patches change besides
     """
 
     settings: tuple[Setting, ...]
@@ -30,6 +39,7 @@ class Plan:
     frames: int
     methods: tuple[Method, ...] = METHODS
     learner: tuple[str, ...] = ()
+    reuse: tuple[str, ...] = SELF_TUNING
 
 
 def _full() -> tuple[Setting, ...]:
@@ -105,5 +115,6 @@ PLANS = {
         frames=400,
         methods=OURS,
         learner=(*OUR_LEARNER, NOISE_KNOWN),
+        reuse=STEADY,
     ),
 }

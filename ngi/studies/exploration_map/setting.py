@@ -17,8 +17,10 @@ ACCEPTANCES = {"greedy": "mcmc_loss_step", "metropolis": "mcmc_metropolis"}
 UNIFORM, PREDICTED = "uniform", "predicted"
 SAMPLERS = (UNIFORM, *(f"{target}_{rule}" for target, rule in product(TARGETS, ACCEPTANCES)))
 
-REUSE = ("reuse=self_tuning", "reuse.policy.bootstrap_batches=20", "reuse.policy.beta=2.0")
+SELF_TUNING = ("reuse=self_tuning", "reuse.policy.bootstrap_batches=20", "reuse.policy.beta=2.0")
 """As in all small budgets: with the paper's 100 and 4.6 hardly a batch would be new."""
+STEADY = ("reuse=steady",)
+"""That of `method=ours`, whoever chooses the samples."""
 NO_REUSE = ("reuse=never",)
 
 
@@ -54,7 +56,7 @@ class Method:
 
     sampler: one of `SAMPLERS`: "uniform", or a target and an acceptance rule; or `PREDICTED`; or of
         `KNOWN`, which takes the place of the uniform one
-    reuse: whether stored patches are trained on again, as the self-tuning policy says
+    reuse: whether stored patches are trained on again, as the plan says
     """
 
     sampler: str
@@ -72,17 +74,15 @@ class Method:
 
     @property
     def overrides(self) -> list[str]:
-        """What it changes in the program's configuration."""
-        reuse = REUSE if self.reuse else NO_REUSE
+        """What it changes in the program's configuration, beside the reuse."""
         if self.sampler == UNIFORM or self.sampler in KNOWN:
-            return [f"sampler={UNIFORM}", *reuse]
+            return [f"sampler={UNIFORM}"]
         if self.predicts:
-            return ["sampler=predicted_loss", *reuse]
+            return ["sampler=predicted_loss"]
         target, rule = self.sampler.rsplit("_", 1)
         return [
             f"sampler={ACCEPTANCES[rule]}",
             f"sampler.target._target_={TARGETS[target]}",
-            *reuse,
         ]
 
 

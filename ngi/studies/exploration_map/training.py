@@ -19,7 +19,14 @@ from ngi.explore import MarkovChains
 from ngi.render import PocketRenderer
 from ngi.studies.exploration_map.known_pockets import KnownPockets
 from ngi.studies.exploration_map.plan import Plan
-from ngi.studies.exploration_map.setting import KNOWN, KNOWN_SHARE, Method, Setting
+from ngi.studies.exploration_map.setting import (
+    KNOWN,
+    KNOWN_SHARE,
+    NO_REUSE,
+    SELF_TUNING,
+    Method,
+    Setting,
+)
 from ngi.studies.exploration_map.test_set import TestSet
 
 PARTS = (
@@ -30,17 +37,20 @@ PARTS = (
 
 
 @lru_cache
-def configuration(method: Method, learner: tuple[str, ...] = ()) -> DictConfig:
+def configuration(
+    method: Method, learner: tuple[str, ...] = (), reuse: tuple[str, ...] = SELF_TUNING
+) -> DictConfig:
     """The program's configuration for a method; what settings change is not in it.
 
-    learner: see `Plan`
+    learner, reuse: see `Plan`
     """
-    return composed("experiment=exploration_map", *learner, *method.overrides)
+    of_reuse = reuse if method.reuse else NO_REUSE
+    return composed("experiment=exploration_map", *learner, *method.overrides, *of_reuse)
 
 
-def plain_configuration(method: Method, learner: tuple[str, ...] = ()) -> dict[str, Any]:
-    """The parts of it that a run is built from, as plain data."""
-    config = configuration(method, learner)
+def plain_configuration(method: Method, plan: Plan) -> dict[str, Any]:
+    """The parts of it that a run of a plan is built from, as plain data."""
+    config = configuration(method, plan.learner, plan.reuse)
     return {part: plain(config[part]) for part in PARTS}
 
 
@@ -58,7 +68,7 @@ def train(setting: Setting, method: Method, seed: int, plan: Plan) -> Iterator[d
     lit: mean over the samples trained on of how far the scene's effects are switched on; for
         samples that are uniform it is the volume
     """
-    config = configuration(method, plan.learner).copy()
+    config = configuration(method, plan.learner, plan.reuse).copy()
     config.seed, config.model.hidden_features = seed, setting.hidden_features
     renderer, test_set = _scene(setting, plan.frames)
     clock = learn.PhaseClock()
