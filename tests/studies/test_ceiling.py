@@ -19,7 +19,7 @@ SMALL = (
     "model.hidden_features=16",
     "model.directions=false",
     *("resolution.start=32", "sampler.chains=4", "evaluation.evaluator.protocol.resolution=32"),
-    *("ceiling.pool=64", "ceiling.patches=[16]", "ceiling.steps=[8]", "ceiling.rounds=2"),
+    *("ceiling.pool=64", "ceiling.sizes=[{patches: 16, steps: 8}]", "ceiling.rounds=2"),
     *("ceiling.teacher_steps=4", "ceiling.seeds=1"),
 )
 
@@ -60,10 +60,15 @@ def test_a_folder_of_another_study_is_refused(tmp_path: Path) -> None:
 
 
 def test_with_the_whole_pool_there_is_no_choice() -> None:
-    found = list(plan(pool=64, patches=[8, 16], steps=[5, 9], choices=["a", "b"], seeds=2))
-    assert len(found) == len(set(found)) == 2 * 2 * 5
+    sizes = [{"patches": 8, "steps": 5}, {"patches": 16, "steps": 9}]
+    found = list(plan(pool=64, sizes=sizes, choices=["a", "b"], seeds=2))
+    assert len(found) == len(set(found)) == 2 * (2 * 2 + 2)
+    assert {(run.patches, run.steps) for run in found} == {(8, 5), (16, 9), (64, 5), (64, 9)}
     assert [run.choice for run in found if run.patches == 64] == ["a"] * 4
     assert [run.seed for run in found] == sorted(run.seed for run in found)
+    sizes.append({"patches": 16, "steps": 5})  # as long as another: with the whole pool the same
+    found = list(plan(pool=64, sizes=sizes, choices=["a", "b"], seeds=1))
+    assert len(found) == len(set(found)) == 3 * 2 + 2
 
 
 class Recorder:

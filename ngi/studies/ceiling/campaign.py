@@ -56,8 +56,7 @@ def run_all(config: DictConfig) -> Path:
     runs = list(
         plan(
             pool=study.pool,
-            patches=study.patches,
-            steps=study.steps,
+            sizes=plain(study)["sizes"],
             choices=list(study.choices),
             seeds=study.seeds,
         )

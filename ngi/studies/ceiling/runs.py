@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import torch
@@ -37,14 +37,18 @@ class Run(NamedTuple):
 
 
 def plan(
-    *, pool: int, patches: Sequence[int], steps: Sequence[int], choices: Sequence[str], seeds: int
+    *, pool: int, sizes: Sequence[Mapping[str, int]], choices: Sequence[str], seeds: int
 ) -> Iterator[Run]:
-    """All runs, the first seed of all of them first; with the whole pool there is no choice."""
+    """All runs, the first seed of all of them first; with the whole pool there is no choice.
+
+    sizes: patches and steps of runs; the whole pool is trained on for as many steps as any of them
+    """
+    lengths = dict.fromkeys(size["steps"] for size in sizes)
+    of_the_pool = [{"patches": pool, "steps": steps} for steps in lengths]
     for seed in range(seeds):
-        for of_steps in steps:
-            for of_patches in (*patches, pool):
-                for choice in choices if of_patches < pool else choices[:1]:
-                    yield Run(of_patches, of_steps, choice, seed)
+        for size in (*sizes, *of_the_pool):
+            for choice in choices if size["patches"] < pool else choices[:1]:
+                yield Run(size["patches"], size["steps"], choice, seed)
 
 
 def do(
