@@ -56,11 +56,11 @@ SAMPLERS = {
 }
 """Every sampler that explores, and its name."""
 
-SCORING = {"loss": 0.35, "output_gradient": 0.4, "loss_step": 1.4, "predicted": 1.2}
+SCORING = {"loss": 0.35, "output_gradient": 0.4, "loss_step": 1.4, "predicted": 0.17}
 """What scoring 16 proposals and 16 current states costs, in training steps of 8 x 512 in bf16.
 
 Measured on two cores (docs/explanation/speed.md; loss alone by the same benchmark). Predicting the
-losses of a batch's candidates takes up to 42 ms (docs/exploration-ceiling), in steps of ours.
+losses of a batch's candidates takes up to 4 ms (docs/exploration-ceiling), in steps of ours.
 """
 
 COST_RATIOS = (0.01, 0.1, 1.0, 10.0, 100.0)
