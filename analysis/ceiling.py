@@ -95,6 +95,21 @@ def table(found: pd.DataFrame, error: str) -> Table:
     return Table(f"Error on {ERRORS[error]}, against uniform choice", columns, tuple(rows), 1)
 
 
+def concentration(runs: pd.DataFrame) -> Table:
+    """Share of the true error that the worst 5 % of patches hold after uniform choice.
+
+    A row per scene, number of steps and patches; runs that do not say it are left out. Where all
+    patches are equally wrong it is 5 %; the nearer it is, the less there is for a choice to find.
+    """
+    rows = []
+    told = runs[runs["choice"] == BASELINE].dropna(subset="worst_share")
+    for (scene, steps, patches), group in told.groupby(["scene", "steps", "patches"]):
+        mean = f"{100 * group['worst_share'].mean():.1f} %"
+        rows.append(tuple(map(Cell, (str(scene), f"{steps}", f"{patches}", mean, f"{len(group)}"))))
+    columns = ("scene", "steps", "patches", "error that the worst 5 % of patches hold", "runs")
+    return Table("How concentrated the error is", columns, tuple(rows), 1)
+
+
 def _by_pair(runs: pd.DataFrame, choice: str, error: str) -> dict[int, float]:
     chosen = runs[runs["choice"] == choice]
     return dict(zip(chosen["pair"], chosen[error], strict=True))
@@ -130,7 +145,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     found = differences(runs)
     runs.to_csv(output / "runs.csv", index=False, float_format="%.6g")
     found.to_csv(output / "differences.csv", index=False, float_format="%.4g")
-    text = "\n\n".join(to_markdown(table(found, error)) for error in ERRORS) + "\n"
+    tables = [*(table(found, error) for error in ERRORS), concentration(runs)]
+    text = "\n\n".join(map(to_markdown, tables)) + "\n"
     (output / "tables.md").write_text(text)
     print(text)
     return 0

@@ -4,9 +4,16 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from analysis.ceiling import EVERYWHERE, NO_CHOICE, differences, main, read_runs
+from analysis.ceiling import (
+    EVERYWHERE,
+    NO_CHOICE,
+    concentration,
+    differences,
+    main,
+    read_runs,
+)
 
-HEADER = "scene,patches,steps,choice,seed,hard_error,uniform_error,hard_tail\n"
+HEADER = "scene,patches,steps,choice,seed,hard_error,uniform_error,hard_tail,worst_share\n"
 
 
 def write(folder: Path, *rows: str) -> None:
@@ -20,14 +27,14 @@ def write(folder: Path, *rows: str) -> None:
 def study(folder: Path) -> None:
     write(
         folder,
-        "room,64,400,uniform,0,0.10,0.2,0.3",
-        "room,64,400,uniform,1,0.20,0.2,0.3",
-        "room,64,400,oracle,0,0.09,0.2,0.3",
-        "room,64,400,oracle,1,0.16,0.2,0.3",
-        "room,1024,400,uniform,0,0.05,0.1,0.3",
-        "room,1024,400,uniform,1,0.08,0.1,0.3",
-        "egg,64,400,uniform,0,0.10,0.2,0.3",
-        "egg,64,400,oracle,0,0.11,0.2,0.3",
+        "room,64,400,uniform,0,0.10,0.2,0.3,0.2",
+        "room,64,400,uniform,1,0.20,0.2,0.3,0.1",
+        "room,64,400,oracle,0,0.09,0.2,0.3,0.2",
+        "room,64,400,oracle,1,0.16,0.2,0.3,0.2",
+        "room,1024,400,uniform,0,0.05,0.1,0.3,0.2",
+        "room,1024,400,uniform,1,0.08,0.1,0.3,0.2",
+        "egg,64,400,uniform,0,0.10,0.2,0.3,0.2",
+        "egg,64,400,oracle,0,0.11,0.2,0.3,0.2",
     )
 
 
@@ -55,6 +62,16 @@ def test_all_scenes_together_have_a_pair_per_scene_and_seed(tmp_path: Path) -> N
     found = differences(read_runs(tmp_path))
     row = only(found, scene=EVERYWHERE, choice="oracle", error="hard_error")
     assert (row["difference"], row["seeds"]) == (pytest.approx((-0.1 - 0.2 + 0.1) / 3), 3)
+
+
+def test_how_concentrated_the_error_is_after_uniform_choice(tmp_path: Path) -> None:
+    study(tmp_path)
+    rows = [[cell.text for cell in row] for row in concentration(read_runs(tmp_path)).rows]
+    assert rows == [
+        ["egg", "400", "64", "20.0 %", "1"],
+        ["room", "400", "64", "15.0 %", "2"],
+        ["room", "400", "1024", "20.0 %", "2"],
+    ]
 
 
 def test_a_study_that_is_not_finished_is_read_as_far_as_it_is(tmp_path: Path) -> None:

@@ -116,7 +116,10 @@ def recorded(monkeypatch: pytest.MonkeyPatch):
             rounds=4,
             evaluator=NoEvaluator(),
         )
-        assert row == {**run._asdict(), "hard_error": 1.0}
+        left = set(range(1000)) - set(torch.cat(training.added).int().tolist())
+        worst = sorted(left)[-48:]  # 5 % of 950, rounded up
+        share = sum(worst) / sum(left)
+        assert row == {**run._asdict(), "hard_error": 1.0, "worst_share": pytest.approx(share)}
         return training
 
     return do
@@ -135,6 +138,11 @@ def test_choices_of_one_seed_begin_with_the_same_patches(recorded) -> None:
     assert not torch.equal(uniform.added[1], oracle.added[1])
     other = recorded(Importance(uniform_share=1.0), seed=1)
     assert not torch.equal(uniform.added[0], other.added[0])
+
+
+def test_equal_errors_are_not_concentrated_and_a_single_one_is() -> None:
+    assert runs.worst_share(torch.full((40,), 0.3)) == pytest.approx(0.05)
+    assert runs.worst_share(torch.eye(1, 40)[0]) == 1
 
 
 def test_the_oracle_draws_in_proportion_to_the_true_error(recorded) -> None:

@@ -16,7 +16,7 @@ from ngi.studies.ceiling.pool import chosen
 from ngi.studies.ceiling.training import Training
 
 TAIL = 0.05
-"""Part of a set's pixels, those of the largest error, that make its tail."""
+"""Part of a set's pixels, or of patches, those of the largest error, that make its tail."""
 
 CHUNK = 512
 """Candidates that the network is asked about at once."""
@@ -65,7 +65,9 @@ def do(
 
     Patches come in `rounds` rounds, evenly over the steps. The first is drawn uniformly, for an
     untrained network has nothing to say, and is the same for all choices of a seed; the others by
-    the true errors of all patches not yet chosen.
+    the true errors of all patches not yet chosen. What the row says beside the errors of `measured`
+    is `worst_share`, the share of these patches' error that the worst 5 % of them hold at the end;
+    with the whole pool chosen, of all patches.
 
     truth: [m, h, w, 3] log1p radiance of the pool, see `Training.answers`
     """
@@ -83,7 +85,15 @@ def do(
         training.add(chosen(pool, candidates[drawn]), weights)
         left[candidates[drawn]] = False
         training.train(_part(run.steps, number, rounds))
-    return {**run._asdict(), **measured(evaluator.evaluate(training.predict))}
+    rest = left.nonzero().flatten() if left.any() else torch.arange(len(pool))
+    share = worst_share(true_errors(training, pool, truth, rest))
+    return {**run._asdict(), **measured(evaluator.evaluate(training.predict)), "worst_share": share}
+
+
+def worst_share(errors: Tensor) -> float:
+    """Part of the sum of errors [n] that the largest 5 % of them make; 0.05 where all are equal."""
+    largest = errors.double().topk(math.ceil(TAIL * len(errors))).values
+    return (largest.sum() / errors.double().sum()).item()
 
 
 def true_errors(
