@@ -112,6 +112,7 @@ def photon_points() -> list[mi.Float]:
     emitters; a Sobol sequence (Joe and Kuo 2008), shifted to its cells' middle.
     """
     points = SobolEngine(5).draw(PHOTONS).double().numpy() + 0.5 / PHOTONS
+    points = points[points[:, 0].argsort()]  # side by side, those of a shape take the same way
     numbers = [mi.Float(column) for column in points.T]
     dr.eval(numbers)
     return numbers
