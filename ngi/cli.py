@@ -4,7 +4,6 @@ A verb is a module with a function `main`, which is imported when its verb is as
 --help` waits for neither PyTorch nor Mitsuba.
 """
 
-import os
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,6 +11,7 @@ from difflib import get_close_matches
 from importlib import import_module
 
 import ngi
+from ngi.config.unread_output import readers_may_leave
 
 
 @dataclass(frozen=True)
@@ -69,13 +69,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     arguments: those of the command line where None
     """
-    try:
-        status = _run(arguments)
-        sys.stdout.flush()
-    except BrokenPipeError:  # `ngi … | head`: who reads it has seen enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # flushed again at the end
-        return 1
-    return status
+    with readers_may_leave():
+        return _run(arguments)
 
 
 def _run(arguments: Sequence[str] | None) -> int:

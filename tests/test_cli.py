@@ -9,6 +9,7 @@ import pytest
 
 import ngi
 from ngi.cli import VERBS, main
+from ngi.config.unread_output import readers_may_leave
 
 ROOT = Path(__file__).parents[1]
 OF_HYDRA = ("train", "costs")
@@ -53,19 +54,60 @@ def test_a_wrong_verb_names_the_nearest(capsys: pytest.CaptureFixture[str]) -> N
     assert "no 'trian'; did you mean 'ngi train'?" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("verb", ["train", "describe"])
-def test_a_reader_that_has_seen_enough_is_told_nothing(verb: str) -> None:
-    """As of `ngi train --help | head`: of Hydra's output and of argparse's."""
-    command = [sys.executable, "-m", "ngi", verb, "--help"]
+def unread(*words: str, unbuffered: bool) -> tuple[int, str]:
+    """Status and messages of a module's command whose output nobody reads."""
+    environment = {k: v for k, v in os.environ.items() if k != "PYTHONUNBUFFERED"}
+    if unbuffered:
+        environment["PYTHONUNBUFFERED"] = "1"
     reading, writing = os.pipe()
     os.close(reading)
     try:
         answer = subprocess.run(
-            command, stdout=writing, stderr=subprocess.PIPE, text=True, cwd=ROOT
+            [sys.executable, "-m", *words],
+            stdout=writing,
+            stderr=subprocess.PIPE,
+            text=True,
+            cwd=ROOT,
+            env=environment,
         )
     finally:
         os.close(writing)
-    assert (answer.returncode, answer.stderr) == (1, "")
+    return answer.returncode, answer.stderr
+
+
+@pytest.mark.parametrize("unbuffered", [False, True])
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("ngi", "train", "--help"),  # Hydra prints it
+        ("ngi.train", "--help"),
+        ("ngi", "describe", "--help"),
+        ("ngi", "describe", "mirror", "backend=scalar"),
+    ],
+    ids=" ".join,
+)
+def test_a_reader_that_has_seen_enough_is_told_nothing(
+    words: tuple[str, ...], unbuffered: bool
+) -> None:
+    """As of `ngi train --help | head`."""
+    assert unread(*words, unbuffered=unbuffered) == (1, "")
+
+
+def test_help_by_argparse_that_nobody_reads_says_nothing_either() -> None:
+    """It swallows the error itself; unbuffered nothing is left to fail."""
+    assert unread("ngi", "report", "--help", unbuffered=False) == (1, "")
+    assert unread("ngi", "report", "--help", unbuffered=True) == (0, "")
+
+
+def test_a_pipe_that_breaks_elsewhere_is_an_error() -> None:
+    with pytest.raises(BrokenPipeError, match="a worker"), readers_may_leave():
+        raise BrokenPipeError("a worker")
+
+
+def test_a_process_without_an_output_prints_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stdout", None)
+    with readers_may_leave():
+        pass
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:

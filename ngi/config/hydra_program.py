@@ -24,6 +24,8 @@ from hydra.types import RunMode
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
+from ngi.config.unread_output import readers_may_leave
+
 OURS = ("budget=machine", "method=ours")
 """What is added to the words."""
 
@@ -71,15 +73,20 @@ def run_program(program: Callable[[], None]) -> None:
     Where its configuration cannot be composed or a job of a sweep has failed, the process ends with
     status 1 and one message. Who sets HYDRA_FULL_ERROR=1 gets the exception with its traceback.
     """
-    if os.environ.get(FULL_ERROR) == "1":
-        program()
-        return
+    with readers_may_leave():
+        if os.environ.get(FULL_ERROR) == "1":
+            program()
+        else:
+            _run(program)
+
+
+def _run(program: Callable[[], None]) -> None:
     os.environ[FULL_ERROR] = "1"
     try:
         program()
     except (CompactHydraException, OmegaConfBaseException) as error:
         sys.exit(explained(error))
-    except BrokenPipeError:  # of what is printed, no folder's
+    except BrokenPipeError:  # of what is printed, see `readers_may_leave`
         raise
     except (OSError, ValueError) as error:  # where Hydra makes the folder, or its log in there
         if str(error).startswith("Only one of --run"):

@@ -85,6 +85,8 @@ def run_tool(
     keep_freed_memory()
     try:
         status = work(options)
+    except BrokenPipeError:  # of what is printed, see `readers_may_leave`
+        raise
     except (ValueError, OSError, RuntimeError) as error:
         print(error, file=sys.stderr)
         return 2
