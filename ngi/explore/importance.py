@@ -18,7 +18,7 @@ class Importance:
     uniform_share: α, in [0, 1]; 1 is the uniform density. As p_i >= α / m, no weight exceeds 1 / α
     power: of the values, above 0
     largest_ratio: R, at least 1; no candidate is drawn more than so many times as often as by
-        uniform draws. What is too rare for a share of the draws does not get it all the same
+        uniform draws. Without it a single one that holds most of the value would get most of 1 - α
     weighted: whether losses are weighted back to uniform candidates; else what is drawn often
         counts often
     Raises ValueError for numbers outside these ranges, and for weights without a bound (α = 0).
@@ -61,12 +61,12 @@ class Importance:
 
     def _bounded(self, probabilities: Tensor) -> Tensor:
         """No entry above R / m, and their sum as it was: [m] to [m]."""
-        largest = min(self.largest_ratio / len(probabilities), 1.0)
+        largest = self.largest_ratio / len(probabilities)
         bounded = probabilities.clamp(max=largest)
         excess = (probabilities - bounded).sum()
-        if excess == 0:
-            return probabilities
         room = largest - bounded
+        if excess == 0 or room.sum() <= 0:  # all at the bound, but for rounding
+            return probabilities
         return bounded + excess * room / room.sum()
 
     def weights(self, probabilities: Tensor) -> Tensor:

@@ -13,8 +13,8 @@ from ngi.explore.importance import Importance
 from ngi.explore.proposals import Proposals
 from ngi.explore.targets import Constant
 
-RENEWED = 8
-"""The forest is grown anew when one in so many of the remembered states is newer than it is."""
+NEWER_SHARE = 1 / 8
+"""Of the remembered states: when so many are newer than the forest, it is grown anew."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,8 @@ class PredictedLoss:
     `importance` makes of their predicted losses. The prediction is a regression forest through the
     states that were rendered last and their losses as they were new, which is what states that the
     network has not met would lose: nothing is rendered for it, and the network is not asked. A
-    forest serves until an eighth of what is remembered is newer, which is what makes it cheap.
+    forest serves until an eighth of what is remembered is newer; with a full memory that is what
+    makes it cheap.
 
     chains: n, states in a batch
     candidates: per batch, at least n
@@ -84,18 +85,20 @@ class PredictedLoss:
         self._candidates = candidates
         self._importance = importance
         self._memory = memory
-        self._trees = {"trees": trees, "depth": depth, "smallest_leaf": smallest_leaf}
+        self._forest = {"trees": trees, "depth": depth, "smallest_leaf": smallest_leaf}
 
     def init(self, state_dimensions: int) -> PredictedState:
         """See `MarkovChains.init`: nothing seen yet."""
-        forest = Forest.flat(trees=self._trees["trees"], depth=self._trees["depth"])
+        forest = Forest.flat(trees=self._forest["trees"], depth=self._forest["depth"])
         return PredictedState.empty(
             self.chains,
             state_dimensions,
             seen=torch.zeros(0, max(state_dimensions, 0)),
             loss=torch.zeros(0),
             newer=torch.tensor(0),
-            **vars(forest),
+            feature=forest.feature,
+            threshold=forest.threshold,
+            leaf=forest.leaf,
         )
 
     def propose(
@@ -128,8 +131,8 @@ class PredictedLoss:
         loss = torch.cat([state.loss, losses[known]])[-self._memory :]
         newer = state.newer + known.sum()
         forest = state.forest
-        if len(seen) >= 2 * self.chains and RENEWED * newer >= len(seen):
-            forest, newer = grow(seen, loss, generator, **self._trees), torch.tensor(0)
+        if len(seen) >= 2 * self.chains and newer >= NEWER_SHARE * len(seen):
+            forest, newer = grow(seen, loss, generator, **self._forest), torch.tensor(0)
         moved = replace(
             state,
             position=proposals.position,
@@ -138,7 +141,9 @@ class PredictedLoss:
             seen=seen,
             loss=loss,
             newer=newer,
-            **vars(forest),
+            feature=forest.feature,
+            threshold=forest.threshold,
+            leaf=forest.leaf,
         )
         everywhere = torch.ones(self.chains, dtype=torch.bool)
         return moved, ChainInfo(everywhere, everywhere, ~state.occupied, moved.age)

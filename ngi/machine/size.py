@@ -1,5 +1,7 @@
 """Which size of network suits this machine, and how it begins a run of a given length."""
 
+from typing import Any
+
 SECONDS_PER_BATCH = 15.0
 """Of the budget, for each batch that is rendered before the first is reused."""
 
@@ -30,12 +32,12 @@ def bootstrap_batches(seconds: float | None) -> int:
     return max(1, min(MOST_BATCHES, int(seconds / SECONDS_PER_BATCH)))
 
 
-def warmup_steps(steps: int | None) -> int:
-    """Over how many steps the learning rate rises: a quarter of a budget too short for 30.
+def warmup_steps(steps: Any) -> int:
+    """Over how many steps the learning rate rises: `WARMUP_STEPS`, at most a quarter of the budget.
 
-    steps: of the budget; None for a budget in seconds
+    steps: of the budget; None for a budget in seconds, and anything else is what is refused later
     """
-    return WARMUP_STEPS if steps is None or steps > WARMUP_STEPS else steps // 4
+    return min(WARMUP_STEPS, steps // 4) if isinstance(steps, int) else WARMUP_STEPS
 
 
 def _has_gpu() -> bool:

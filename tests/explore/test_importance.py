@@ -30,6 +30,26 @@ def test_nothing_is_drawn_more_often_than_the_bound(ratio: float) -> None:
     assert found.min().item() >= 0.2 / 4
 
 
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.3, 0.9])
+def test_equal_values_make_a_uniform_density_under_the_closest_bound(share: float) -> None:
+    """Rounding takes all of them above 1 / m or below it."""
+    importance = Importance(uniform_share=share, largest_ratio=1.0)
+    for count in range(1, 200):
+        found = importance.probabilities(torch.ones(count))
+        np.testing.assert_allclose(found.numpy(), np.full(count, 1 / count), rtol=1e-12)
+
+
+def test_draws_of_several_keep_to_the_bound() -> None:
+    """Of 64 candidates one has all the value; four are drawn, eight times as often at most."""
+    values = torch.eye(1, 64)[0]
+    importance = Importance(uniform_share=0.1, largest_ratio=8.0)
+    generator = torch.Generator().manual_seed(2)
+    drawn = torch.cat([importance.draw(values, 4, generator)[0] for _ in range(2000)])
+    often = np.bincount(drawn.numpy(), minlength=64) / 2000
+    assert 5 / 16 < often[0] <= 8 / 16
+    assert often[1:].mean() == pytest.approx((4 - often[0]) / 63)
+
+
 def test_a_bound_that_nothing_reaches_changes_no_bit() -> None:
     plain, bounded = (Importance(uniform_share=0.2, largest_ratio=r) for r in (math.inf, 3.0))
     assert torch.equal(plain.probabilities(VALUES), bounded.probabilities(VALUES))

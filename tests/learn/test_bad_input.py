@@ -54,6 +54,7 @@ def test_an_error_of_the_command_line_ends_it(
             ["schedule=warmup_stable_decay", "schedule.warmup_steps=30", "budget.steps=12"],
             ["schedule.warmup_steps: 30", "budget.steps: 12", "schedule.warmup_steps=3"],
         ),
+        (["schedule=warmup_stable_decay", "budget.steps=many"], ["budget.steps", "many"]),
         (["averaging=exponential", "averaging.decay=1"], ["averaging.decay: 1"]),
         (["model._target_=torch.nn.ReLU"], ["model: ReLU", "unexpected", "hidden_features"]),
         ([f"model._target_={__name__}.Blind"], ["model: Blind has no method render"]),

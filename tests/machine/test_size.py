@@ -15,7 +15,7 @@ def test_the_bootstrap_is_a_share_of_the_budget(seconds: float | None, batches: 
 
 
 @pytest.mark.parametrize(
-    ("steps", "warmup"), [(None, 30), (31, 30), (1400, 30), (30, 7), (12, 3), (1, 0)]
+    ("steps", "warmup"), [(None, 30), (1400, 30), (120, 30), (119, 29), (31, 7), (12, 3), (1, 0)]
 )
 def test_the_warm_up_fits_into_the_budget(steps: int | None, warmup: int) -> None:
     assert warmup_steps(steps) == warmup

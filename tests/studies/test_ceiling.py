@@ -71,6 +71,19 @@ def test_with_the_whole_pool_there_is_no_choice() -> None:
     assert len(found) == len(set(found)) == 3 * 2 + 2
 
 
+@pytest.mark.parametrize(
+    ("sizes", "named"),
+    [
+        ([{"patches": 64, "steps": 5}], "64 patches of a pool of 64"),
+        ([{"patches": 65, "steps": 5}], "65 patches of a pool of 64"),
+        ([{"patches": 8, "steps": 5}] * 2, "'patches': 8, 'steps': 5} is given twice"),
+    ],
+)
+def test_sizes_that_make_no_study_are_refused(sizes: list[dict[str, int]], named: str) -> None:
+    with pytest.raises(ValueError, match=named):
+        list(plan(pool=64, sizes=sizes, choices=["a"], seeds=1))
+
+
 class Recorder:
     """A training that trains nothing, and is the more wrong the larger the patch."""
 

@@ -42,7 +42,16 @@ def plan(
     """All runs, the first seed of all of them first; with the whole pool there is no choice.
 
     sizes: patches and steps of runs; the whole pool is trained on for as many steps as any of them
+    Raises ValueError for a size without a choice, and for one that is given twice.
     """
+    for size in sizes:
+        if size["patches"] >= pool:
+            raise ValueError(
+                f"ceiling.sizes: {size['patches']} patches of a pool of {pool} leave no choice; "
+                "raise ceiling.pool (the whole pool is trained on in any case)"
+            )
+        if sizes.count(size) > 1:
+            raise ValueError(f"ceiling.sizes: {dict(size)} is given twice")
     lengths = dict.fromkeys(size["steps"] for size in sizes)
     of_the_pool = [{"patches": pool, "steps": steps} for steps in lengths]
     for seed in range(seeds):
