@@ -40,7 +40,8 @@ class Claim:
     id: name of the sweep that tests it; title: a few words; statement: what the paper says, in our
     words; source: where it says so; test: what we measure and when we call it reproduced, where
     the comparisons alone do not say it; primary: the one test that can refute the claim, its first
-    comparison or its first finding; command: what runs it.
+    comparison or its first finding; with_ours: whether the samplings that it is about are compared
+    with our learner in place of the paper's; command: what runs it.
     """
 
     id: str
@@ -50,6 +51,7 @@ class Claim:
     comparisons: tuple[Comparison, ...] = ()
     test: str = ""
     primary: Literal["comparison", "finding"] = "comparison"
+    with_ours: bool = False
 
     @property
     def command(self) -> str:
@@ -189,7 +191,7 @@ WITH_OURS = {
     "loss_target": "ours_loss_target",
     "metropolis": "ours_metropolis",
 }
-"""Methods of the paper, and what is the same with our learner."""
+"""Methods of the paper, and what is the same with our learner, whose resolution is constant."""
 
 
 def _with_ours(claim: Claim) -> Claim:
@@ -197,7 +199,9 @@ def _with_ours(claim: Claim) -> Claim:
     return replace(
         claim,
         id=f"ours_{claim.id}",
+        with_ours=True,
         title=f"{claim.title}, with our learner",
+        statement=claim.statement.replace("the Adam step", "the optimiser's step"),
         comparisons=tuple(
             replace(
                 comparison, better=WITH_OURS[comparison.better], worse=WITH_OURS[comparison.worse]

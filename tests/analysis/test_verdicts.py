@@ -5,6 +5,7 @@ import yaml
 
 from analysis.claim_tables import claims_table
 from analysis.claims import CLAIMS, SALONS
+from analysis.findings import FINDINGS
 from analysis.methods import TITLES, name_methods
 from analysis.runs import find_runs
 from analysis.verdicts import ALL_SCENES, ClaimResult, Verdict, judge
@@ -25,6 +26,22 @@ def test_a_claim_needs_what_its_sweep_runs(claim) -> None:
     assert scenes == set(parameters["scene"].split(","))
     assert methods <= set(parameters["method"].split(","))
     assert claim.command == f"python -m ngi.train -m +sweeps={claim.id} budget=small"
+
+
+def test_every_claim_has_a_test_that_decides() -> None:
+    """A comparison or a finding, and the primary one is there."""
+    for claim in CLAIMS:
+        compared = any(comparison.decides for comparison in claim.comparisons)
+        found = claim.id in FINDINGS
+        assert compared or found, claim.id
+        assert found if claim.primary == "finding" else compared, claim.id
+    assert {claim.id for claim in CLAIMS} >= FINDINGS.keys()
+
+
+def test_with_our_learner_no_statement_is_about_the_papers_optimiser() -> None:
+    ours = [claim for claim in CLAIMS if claim.with_ours]
+    assert len(ours) == 4
+    assert not any("Adam" in claim.statement for claim in ours)
 
 
 def test_the_claim_on_anf_is_at_the_samples_that_anf_gets() -> None:
@@ -79,7 +96,7 @@ def test_each_learner_is_judged_by_its_own_runs(make_method, tmp_path) -> None:
     verdicts = {name: result.verdict for name, result in results.items()}
     assert verdicts["acceptance"] is verdicts["dimensions"] is Verdict.NOT_RUN
     assert verdicts["ours_acceptance"] is verdicts["ours_dimensions"] is Verdict.REPRODUCED
-    assert "ours with chains and Metropolis acceptance" in results["ours_acceptance"].sentence
+    assert "ours exploring, with Metropolis acceptance" in results["ours_acceptance"].sentence
 
 
 def test_a_missing_scene_leaves_the_claim_open(make_method, tmp_path) -> None:

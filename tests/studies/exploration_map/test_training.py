@@ -82,6 +82,24 @@ def test_methods_are_what_their_names_say(method: Method) -> None:
     assert config.reuse.policy._target_.endswith("SelfTuning" if method.reuse else "Never")
 
 
+@pytest.mark.parametrize("plan", PLANS.values(), ids=PLANS.keys())
+def test_every_plan_can_be_composed(plan: Plan) -> None:
+    for method in plan.methods:
+        made = training.plain_configuration(method, plan)
+        assert made.keys() >= {"data", "sampler", "reuse", "renderer"}
+
+
+def test_the_long_plan_reuses_as_ours_does_and_knows_the_noise() -> None:
+    plan = PLANS["ours_long"]
+    for method in plan.methods:
+        made = training.plain_configuration(method, plan)
+        policy = "FixedProbability" if method.reuse else "Never"
+        assert made["reuse"]["policy"]["_target_"].endswith(policy)
+        assert made["data"]["halves"] is True
+    (last,) = rows(Method("predicted", reuse=True), plan=replace(plan, steps=12, evaluations=1))
+    assert last["generated_batches"] < 12
+
+
 def test_predictions_are_counted_as_scores_are() -> None:
     """One per new batch, also where chains would have nothing to be compared with yet."""
     method = Method("predicted", reuse=False)
