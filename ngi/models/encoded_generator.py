@@ -68,8 +68,11 @@ class EncodedGenerator(nn.Module):
         check_inputs(
             buffers, scene_vector, layout=self.layout, scene_dimensions=self.scene_dimensions
         )
-        output = self._output(buffers.flatten(1, 2), scene_vector, _precision(buffers))
-        output = output.unflatten(1, buffers.shape[1:3])
+        pixels, precision = buffers.flatten(1, 2), _precision(buffers)
+        with torch.autocast(pixels.device.type, enabled=False):
+            encoded = self.encoding(pixels, scene_vector, precision)
+            output: Tensor = self.mlp(encoded, scene_vector)
+        output = output.to(pixels.dtype).unflatten(1, buffers.shape[1:3])
         return add_known_light(output, buffers, self.layout)
 
     @torch.no_grad()
@@ -82,22 +85,20 @@ class EncodedGenerator(nn.Module):
             scene_dimensions=self.scene_dimensions,
         )
         precision = _precision(buffers)
+        with torch.autocast(buffers.device.type, enabled=False):
+            of_pixels = self.mlp.at(scene_vector, precision)
 
         def output_of(chunk: Tensor) -> Tensor:
-            return self._output(chunk[None], scene_vector[None], precision)[0]
+            encoded = self.encoding(chunk[None], scene_vector[None], precision)[0]
+            return of_pixels(encoded).to(chunk.dtype)
 
         pixels = buffers.flatten(0, 1)
         if buffers.device.type == "cpu":
             output = torch.cat(in_parallel(output_of, pixels.split(CACHED_PIXELS)))
         else:
-            output = torch.cat([output_of(chunk) for chunk in pixels.split(MANY_PIXELS)])
+            with torch.autocast(buffers.device.type, enabled=False):
+                output = torch.cat([output_of(chunk) for chunk in pixels.split(MANY_PIXELS)])
         return add_known_light(output.unflatten(0, buffers.shape[:2]), buffers, self.layout)
-
-    def _output(self, pixels: Tensor, scene_vector: Tensor, precision: torch.dtype) -> Tensor:
-        """Of the last layer: [n, p, C] and [n, D] to [n, p, 3]."""
-        with torch.autocast(pixels.device.type, enabled=False):
-            output: Tensor = self.mlp(self.encoding(pixels, scene_vector, precision), scene_vector)
-        return output.to(pixels.dtype)
 
 
 def _precision(pixels: Tensor) -> torch.dtype:

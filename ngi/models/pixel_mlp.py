@@ -6,6 +6,7 @@ and activation fused, and what the first layer adds to all pixels of a patch is 
 weight, so that neither it nor its gradient takes a pass of its own.
 """
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -77,6 +78,29 @@ class PixelMLP(nn.Module):
             output, _, _ = _forward(*arguments)
         by_patch: Tensor = output.unflatten(0, pixels.shape[:2])
         return by_patch
+
+    @torch.no_grad()
+    def at(self, patch: Tensor, precision: torch.dtype) -> Callable[[Tensor], Tensor]:
+        """The same for any pixels of one patch [D]: [p, I] to [p, out], without a gradient.
+
+        What all of an image's pieces share, the weights in `precision` and what the patch adds to
+        the first layer's bias, is made once. Any number of threads may call it.
+        """
+        first = F.linear(patch, self.patch_weight, self.patch_bias)
+        weights = [weight.to(precision) for weight in self.weights]
+        biases = [bias.to(precision) for bias in (first, *self.biases)]
+        skip, last = self.skip, len(weights) - 1
+
+        def output(pixels: Tensor) -> Tensor:
+            features = pixels
+            for number, (weight, bias) in enumerate(zip(weights, biases, strict=True)):
+                if number == skip:
+                    features = torch.cat([features, pixels], dim=1)
+                slope = NEGATIVE_SLOPE if number < last else None
+                features = activated_linear(features, weight, bias, negative_slope=slope)
+            return features
+
+        return output
 
     def _show_of_patches(self, watcher: SampleGradients, patch: Tensor, g: Tensor) -> None:
         """g: gradient of each patch's bias in the first layer, [n, H]; patch: [n, D]."""
