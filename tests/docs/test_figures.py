@@ -90,12 +90,23 @@ def test_a_frame_of_ours_takes_the_share_of_the_denoisers_time_that_is_said() ->
 
 def test_the_readme_says_of_predicted_losses_what_their_table_says() -> None:
     less = r"-(\d+\.\d) ± (\d+\.\d) %"
-    row = rf"base +\| 2000 +\| no +\| predicted loss .+?{less} \| +{less}"
-    measured = said("docs/exploration-ceiling/known/errors.md", row)
+    row = rf"base +\| 4000 +\| no +\| predicted loss .+?{less} \| +{less}"
+    measured = said("docs/exploration-ceiling/long/errors.md", row)
     shown = said(
         "README.md", r"(\d+) % ± (\d+) less error on the worst .+ (\d+) % ± (\d+) less on av"
     )
     assert shown == tuple(f"{float(figure):.0f}" for figure in measured)
+
+
+def test_the_readme_says_of_the_oracle_what_the_study_says() -> None:
+    found = pd.read_csv(ROOT / "docs/exploration-ceiling/differences.csv")
+    (row,) = found.query(
+        "scene == 'all of them' and steps == 1600 and choice == 'oracle' and error == 'hard_error'"
+    ).to_dict("records")
+    measured = f"{-100 * row['difference']:.1f}", f"{100 * row['half_width']:.1f}"
+    assert said("README.md", r"takes (\d\.\d) % ± (\d\.\d) off") == measured
+    page = r"seven scenes the oracle takes (\d\.\d) % ± (\d\.\d) off hard"
+    assert said("docs/exploration-ceiling/README.md", page) == measured
 
 
 def test_the_page_of_results_counts_the_runs_that_there_are() -> None:
