@@ -59,6 +59,15 @@ def test_a_folder_of_another_study_is_refused(tmp_path: Path) -> None:
         campaign.run_all(configuration(folder))
 
 
+def test_a_size_that_leaves_no_choice_is_refused_before_anything_is_rendered(
+    tmp_path: Path,
+) -> None:
+    folder = tmp_path / "a"
+    with pytest.raises(ValueError, match="leave no choice"):
+        campaign.run_all(configuration(folder, "ceiling.sizes=[{patches: 64, steps: 8}]"))
+    assert not folder.exists()
+
+
 def test_with_the_whole_pool_there_is_no_choice() -> None:
     sizes = [{"patches": 8, "steps": 5}, {"patches": 16, "steps": 9}]
     found = list(plan(pool=64, sizes=sizes, choices=["a", "b"], seeds=2))

@@ -37,6 +37,14 @@ def run_all(config: DictConfig) -> Path:
     Raises ValueError for a folder whose runs were made with another scene or configuration.
     """
     study, folder = config.ceiling, Path(config.run.folder)
+    runs = list(
+        plan(
+            pool=study.pool,
+            sizes=plain(study)["sizes"],
+            choices=list(study.choices),
+            seeds=study.seeds,
+        )
+    )
     keep_freed_memory()
     with closing(instantiate(config.renderer)) as renderer:
         _claim(folder, config, scene=renderer.scene_hash, backend=renderer.description)
@@ -53,14 +61,6 @@ def run_all(config: DictConfig) -> Path:
             count=study.pool,
         )
     truth = _truth(config, samples, pool, evaluator, folder)
-    runs = list(
-        plan(
-            pool=study.pool,
-            sizes=plain(study)["sizes"],
-            choices=list(study.choices),
-            seeds=study.seeds,
-        )
-    )
     for run in tqdm(runs, desc="runs", unit="run"):
         if not _file(folder, run).exists():
             training = Training(
