@@ -11,6 +11,8 @@ from importlib.metadata import PackageNotFoundError, packages_distributions, req
 from itertools import chain
 from pathlib import Path
 
+from packaging.requirements import Requirement
+
 from ngi.machine.backend import VARIANTS
 from ngi.studies.gpu_check.runs import FORMULAS, METHODS
 from tools.wheelhouse import NEEDED, ROOT, USUAL, listed, trim
@@ -62,18 +64,18 @@ def normalised(name: str) -> str:
 
 
 def with_what_they_need(*names: str) -> set[str]:
-    """Distributions, and all that these ask for without an extra."""
+    """Distributions, and all that these ask for on this system without an extra."""
     found: set[str] = set()
     waiting = [normalised(name) for name in names]
     while waiting:
         name = waiting.pop()
         try:
-            wanted = requires(name) or ()
-        except PackageNotFoundError:  # for other systems
+            wanted = map(Requirement, requires(name) or ())
+        except PackageNotFoundError:  # what the machine has in its stead
             continue
         found.add(name)
-        plain = (line for line in wanted if "extra ==" not in line)
-        asked = (normalised(re.split(r"[^\w.-]", line, maxsplit=1)[0]) for line in plain)
+        plain = (of for of in wanted if of.marker is None or of.marker.evaluate({"extra": ""}))
+        asked = (normalised(of.name) for of in plain)
         waiting += [other for other in asked if other not in found]
     return found
 
