@@ -98,11 +98,11 @@ def table(found: pd.DataFrame, error: str) -> Table:
 def concentration(runs: pd.DataFrame) -> Table:
     """Share of the true error that the worst 5 % of patches hold after uniform choice.
 
-    A row per scene, number of steps and patches; runs that do not say it are left out. Where all
-    patches are equally wrong it is 5 %; the nearer it is, the less there is for a choice to find.
+    A row per scene, number of steps and patches. Where all patches are equally wrong it
+    is 5 %; the nearer it is, the less there is for a choice to find.
     """
     rows = []
-    told = runs[runs["choice"] == BASELINE].dropna(subset="worst_share")
+    told = runs[runs["choice"] == BASELINE]
     for (scene, steps, patches), group in told.groupby(["scene", "steps", "patches"]):
         mean = f"{100 * group['worst_share'].mean():.1f} %"
         rows.append(tuple(map(Cell, (str(scene), f"{steps}", f"{patches}", mean, f"{len(group)}"))))

@@ -106,8 +106,7 @@ def test_a_pipe_that_breaks_elsewhere_is_an_error() -> None:
 
 def test_a_process_without_an_output_prints_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "stdout", None)
-    with readers_may_leave():
-        pass
+    assert main(["--version"]) == 0
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:

@@ -73,21 +73,15 @@ def run_program(program: Callable[[], None]) -> None:
     Where its configuration cannot be composed or a job of a sweep has failed, the process ends with
     status 1 and one message. Who sets HYDRA_FULL_ERROR=1 gets the exception with its traceback.
     """
-    with readers_may_leave():
-        if os.environ.get(FULL_ERROR) == "1":
-            program()
-        else:
-            _run(program)
-
-
-def _run(program: Callable[[], None]) -> None:
+    if os.environ.get(FULL_ERROR) == "1":
+        program()
+        return
     os.environ[FULL_ERROR] = "1"
     try:
-        program()
+        with readers_may_leave():
+            program()
     except (CompactHydraException, OmegaConfBaseException) as error:
         sys.exit(explained(error))
-    except BrokenPipeError:  # of what is printed, see `readers_may_leave`
-        raise
     except (OSError, ValueError) as error:  # where Hydra makes the folder, or its log in there
         if str(error).startswith("Only one of --run"):
             sys.exit(f"{error}; the settings of one run of a sweep: without -m, --cfg job")

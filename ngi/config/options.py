@@ -9,6 +9,7 @@ from typing import Any, NoReturn, TypeVar, cast
 
 from pydantic import TypeAdapter, ValidationError
 
+from ngi.config.unread_output import readers_may_leave
 from ngi.machine.memory import keep_freed_memory
 
 Options = TypeVar("Options")
@@ -84,9 +85,8 @@ def run_tool(
     options = read_options(kind, program, sys.argv[1:] if arguments is None else arguments)
     keep_freed_memory()
     try:
-        status = work(options)
-    except BrokenPipeError:  # of what is printed, see `readers_may_leave`
-        raise
+        with readers_may_leave():
+            status = work(options)
     except (ValueError, OSError, RuntimeError) as error:
         print(error, file=sys.stderr)
         return 2

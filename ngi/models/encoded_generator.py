@@ -84,19 +84,17 @@ class EncodedGenerator(nn.Module):
             layout=self.layout,
             scene_dimensions=self.scene_dimensions,
         )
-        precision = _precision(buffers)
-        with torch.autocast(buffers.device.type, enabled=False):
-            of_pixels = self.mlp.at(scene_vector, precision)
+        precision, pixels = _precision(buffers), buffers.flatten(0, 1)
 
         def output_of(chunk: Tensor) -> Tensor:
             encoded = self.encoding(chunk[None], scene_vector[None], precision)[0]
             return of_pixels(encoded).to(chunk.dtype)
 
-        pixels = buffers.flatten(0, 1)
-        if buffers.device.type == "cpu":
-            output = torch.cat(in_parallel(output_of, pixels.split(CACHED_PIXELS)))
-        else:
-            with torch.autocast(buffers.device.type, enabled=False):
+        with torch.autocast(buffers.device.type, enabled=False):
+            of_pixels = self.mlp.at(scene_vector, precision)
+            if buffers.device.type == "cpu":
+                output = torch.cat(in_parallel(output_of, pixels.split(CACHED_PIXELS)))
+            else:
                 output = torch.cat([output_of(chunk) for chunk in pixels.split(MANY_PIXELS)])
         return add_known_light(output.unflatten(0, buffers.shape[:2]), buffers, self.layout)
 

@@ -6,7 +6,7 @@ and activation fused, and what the first layer adds to all pixels of a patch is 
 weight, so that neither it nor its gradient takes a pass of its own.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -89,18 +89,7 @@ class PixelMLP(nn.Module):
         first = F.linear(patch, self.patch_weight, self.patch_bias)
         weights = [weight.to(precision) for weight in self.weights]
         biases = [bias.to(precision) for bias in (first, *self.biases)]
-        skip, last = self.skip, len(weights) - 1
-
-        def output(pixels: Tensor) -> Tensor:
-            features = pixels
-            for number, (weight, bias) in enumerate(zip(weights, biases, strict=True)):
-                if number == skip:
-                    features = torch.cat([features, pixels], dim=1)
-                slope = NEGATIVE_SLOPE if number < last else None
-                features = activated_linear(features, weight, bias, negative_slope=slope)
-            return features
-
-        return output
+        return lambda pixels: _through_layers(pixels, pixels, self.skip, weights, biases)
 
     def _show_of_patches(self, watcher: SampleGradients, patch: Tensor, g: Tensor) -> None:
         """g: gradient of each patch's bias in the first layer, [n, H]; patch: [n, D]."""
@@ -202,12 +191,30 @@ def _forward(
     columns = F.pad(patch_bias.mT.to(pixels.dtype), (0, -(width + patches) % ALIGNMENT))
     weights.insert(0, torch.cat([first, columns], dim=1))
     own = torch.eye(patches, columns.shape[1], dtype=pixels.dtype, device=pixels.device)
-    inputs = []
+    inputs: list[Tensor] = []
     features = torch.cat([pixels, own[:, None].expand(-1, size, -1)], dim=-1).flatten(0, 1)
+    output = _through_layers(features, pixels.flatten(0, 1), skip, weights, biases, inputs)
+    return output, weights, inputs
+
+
+def _through_layers(
+    features: Tensor,
+    pixels: Tensor,
+    skip: int,
+    weights: Sequence[Tensor],
+    biases: Sequence[Tensor | None],
+    inputs: list[Tensor] | None = None,
+) -> Tensor:
+    """What the last layer gives, [p, out].
+
+    features: of the first layer; pixels: [p, I], joined to those of layer `skip`
+    inputs: gets what each layer was given, if a list
+    """
     for number, (weight, bias) in enumerate(zip(weights, biases, strict=True)):
         if number == skip:
-            features = torch.cat([features, pixels.flatten(0, 1)], dim=1)
-        inputs.append(features)
-        slope = NEGATIVE_SLOPE if number < layers - 1 else None
+            features = torch.cat([features, pixels], dim=1)
+        if inputs is not None:
+            inputs.append(features)
+        slope = NEGATIVE_SLOPE if number < len(weights) - 1 else None
         features = activated_linear(features, weight, bias, negative_slope=slope)
-    return features, weights, inputs
+    return features

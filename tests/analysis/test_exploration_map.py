@@ -228,8 +228,11 @@ def test_what_is_not_there_is_said(tmp_path: Path, capsys: pytest.CaptureFixture
         read_table(tmp_path)
 
 
-def test_final_errors_are_those_of_the_last_step_paired_by_seed(tmp_path: Path) -> None:
+def test_final_errors_are_those_of_the_last_step_paired_by_seed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Seed 1 has ten times the error of seed 0 with both samplers: half as much in each pair."""
+    monkeypatch.setitem(SCORING, "predicted", 1.2)
     rows = rows_of({"uniform": 0.004, "predicted": 0.004})
     rows.loc[rows["sampler"] == "predicted", "error_tail"] *= 0.5
     rows.loc[rows["seed"] == 1, "error_tail"] *= 10
@@ -246,7 +249,7 @@ def test_final_errors_are_those_of_the_last_step_paired_by_seed(tmp_path: Path) 
     assert "-50.0 ± 0.0 %" in predicted
     assert uniform.split("|")[-2].strip() == ""
     half = math.log(2) / 0.004  # steps to half of the error
-    expected = 990 / (990 - half) * 6 / (6 + SCORING["predicted"] / 2)  # every other batch is new
+    expected = 990 / (990 - half) * 6 / 6.6
     assert float(predicted.split("|")[-3]) == pytest.approx(expected, abs=0.06)
 
 

@@ -63,8 +63,12 @@ def normalised(name: str) -> str:
     return re.sub(r"[-_.]+", "-", name).lower()
 
 
+THAT_MACHINE = {"extra": "", "python_version": "3.12", "python_full_version": "3.12.1"}
+"""Linux, too, but not this Python: the wheels are of CPython 3.12."""
+
+
 def with_what_they_need(*names: str) -> set[str]:
-    """Distributions, and all that these ask for on this system without an extra."""
+    """Distributions, and all that these ask for there without an extra."""
     found: set[str] = set()
     waiting = [normalised(name) for name in names]
     while waiting:
@@ -74,7 +78,7 @@ def with_what_they_need(*names: str) -> set[str]:
         except PackageNotFoundError:  # what the machine has in its stead
             continue
         found.add(name)
-        plain = (of for of in wanted if of.marker is None or of.marker.evaluate({"extra": ""}))
+        plain = (of for of in wanted if of.marker is None or of.marker.evaluate(THAT_MACHINE))
         asked = (normalised(of.name) for of in plain)
         waiting += [other for other in asked if other not in found]
     return found

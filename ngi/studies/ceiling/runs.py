@@ -101,8 +101,8 @@ def do(
 
 def worst_share(errors: Tensor) -> float:
     """Part of the sum of errors [n] that the largest 5 % of them make; 0.05 where all are equal."""
-    largest = errors.double().topk(math.ceil(TAIL * len(errors))).values
-    return (largest.sum() / errors.double().sum()).item()
+    errors = errors.double()
+    return (_worst(errors).sum() / errors.sum()).item()
 
 
 def true_errors(
@@ -138,7 +138,12 @@ def _tail(evaluation: Evaluation, name: str) -> float:
             if each.frame.set == name
         ]
     )
-    return errors.topk(math.ceil(TAIL * len(errors))).values.mean().item()
+    return _worst(errors).mean().item()
+
+
+def _worst(errors: Tensor) -> Tensor:
+    """The largest 5 % of [n]."""
+    return errors.topk(math.ceil(TAIL * len(errors))).values
 
 
 def _part(whole: int, number: int, parts: int) -> int:
