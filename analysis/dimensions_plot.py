@@ -12,51 +12,67 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from analysis.claims import SALONS
+from analysis.claims import CLAIMS, SALONS
 from analysis.curves import error_curve
 from analysis.pairs import pair_runs
 from analysis.plots import STYLE, add_legend, draw_band, new_figure, save_figure
 from analysis.runs import METRICS, Run
 from analysis.tables import TITLES
 
-BETTER, WORSE = "active_exploration", "uniform"
+COMPARED = {
+    claim.id: (claim.comparisons[0].better, claim.comparisons[0].worse)
+    for claim in CLAIMS
+    if claim.id in ("dimensions", "ours_dimensions")
+}
+"""By the claim's id: the method that explores, and uniform sampling."""
 
 
-def write_dimensions_figure(runs: Sequence[Run], folder: Path) -> list[Path]:
-    """Writes `dimensions.png` and `.svg`; nothing where no scene has both methods."""
-    if not salons_of_both(runs):
-        return []
-    with matplotlib.rc_context(STYLE):
-        figure = dimensions_figure(runs, METRICS)
-        figure.suptitle(
-            f"error of {WORSE} minus error of {BETTER}, hard frames (band: 95 % interval)",
-            fontsize=10,
-        )
-        return save_figure(figure, folder, "dimensions")
+def write_dimensions_figures(runs: Sequence[Run], folder: Path) -> list[Path]:
+    """Writes `dimensions.png`, `ours_dimensions.png` and `.svg` of the claims that have runs."""
+    files = []
+    for claim in claims_with_salons(runs):
+        exploration, uniform = COMPARED[claim]
+        with matplotlib.rc_context(STYLE):
+            figure = dimensions_figure(runs, METRICS, claim)
+            figure.suptitle(
+                f"error of {uniform} minus error of {exploration}, hard frames "
+                "(band: 95 % interval)",
+                fontsize=10,
+            )
+            files += save_figure(figure, folder, claim)
+    return files
 
 
-def dimensions_figure(runs: Sequence[Run], metrics: Sequence[str]) -> Figure:
-    """A panel per metric with a curve per scene; above zero exploration has less error."""
+def dimensions_figure(runs: Sequence[Run], metrics: Sequence[str], claim: str) -> Figure:
+    """A panel per metric with a curve per scene; above zero exploration has less error.
+
+    claim: of `COMPARED`
+    """
     figure = new_figure(3.3 * len(metrics), 3.0)
     panels = figure.subplots(1, len(metrics), squeeze=False)[0]
     for axes, metric in zip(panels, metrics, strict=True):
-        _draw(axes, runs, f"hard_{metric}")
+        _draw(axes, runs, f"hard_{metric}", claim)
         axes.set_title(f"{TITLES[metric]}: difference", fontsize=9, loc="left")
         axes.set_xlabel("run time in seconds")
     add_legend(figure)
     return figure
 
 
-def salons_of_both(runs: Sequence[Run]) -> list[str]:
-    """The Salon's variants in which both methods have runs of the same seed."""
-    return [salon for salon in SALONS if pair_runs(runs, salon, BETTER, WORSE)]
+def claims_with_salons(runs: Sequence[Run]) -> list[str]:
+    """The claims of `COMPARED` that at least one of the Salon's variants has runs for."""
+    return [claim for claim in COMPARED if salons_of_both(runs, claim)]
 
 
-def _draw(axes: Axes, runs: Sequence[Run], key: str) -> None:
-    salons = salons_of_both(runs)
+def salons_of_both(runs: Sequence[Run], claim: str) -> list[str]:
+    """The Salon's variants in which both of a claim's methods have runs of the same seed."""
+    return [salon for salon in SALONS if pair_runs(runs, salon, *COMPARED[claim])]
+
+
+def _draw(axes: Axes, runs: Sequence[Run], key: str, claim: str) -> None:
+    salons = salons_of_both(runs, claim)
     colours = matplotlib.colormaps["viridis"](np.linspace(0, 0.85, len(salons)))
     for salon, colour in zip(salons, colours, strict=True):
-        pairs = pair_runs(runs, salon, BETTER, WORSE)
+        pairs = pair_runs(runs, salon, *COMPARED[claim])
         differences = [_difference(pair.better, pair.worse, key) for pair in pairs]
         curve = error_curve(differences, key, signed=True)
         if curve is not None:

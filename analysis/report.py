@@ -16,7 +16,7 @@ from tqdm import tqdm
 
 from analysis.claim_tables import claims_table
 from analysis.claims import CLAIMS
-from analysis.dimensions_plot import write_dimensions_figure
+from analysis.dimensions_plot import write_dimensions_figures
 from analysis.exploration import exploration_table
 from analysis.exploration_plots import write_exploration_figures
 from analysis.films import film_tables
@@ -78,7 +78,7 @@ def write_report(folder: Path, output: Path) -> Report:
         pictures, lacking = write_comparisons(of_scene, output / "pictures")
         files += pictures
         missing += lacking
-    files += write_dimensions_figure(runs, output)
+    files += write_dimensions_figures(runs, output)
     exploration = write_exploration_figures(runs, styles, output)
     warnings += doubts + missing
     contents = PageContents(

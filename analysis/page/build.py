@@ -13,7 +13,7 @@ import matplotlib
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from analysis.dimensions_plot import dimensions_figure, salons_of_both
+from analysis.dimensions_plot import COMPARED, claims_with_salons, dimensions_figure, salons_of_both
 from analysis.evidence import Verdict
 from analysis.frame_times import frame_table
 from analysis.page.images import Illustration, from_figure, from_files
@@ -162,15 +162,14 @@ def _exploration_caption(name: str) -> str:
 
 
 def _dimensions_figures(runs: Sequence[Run]) -> list[Illustration]:
-    """A figure per metric; none where no Salon has both methods."""
-    if not salons_of_both(runs):
-        return []
+    """A figure per metric, with the paper's learner and with ours, of which there are runs."""
     with matplotlib.rc_context(STYLE):
         return [
             from_figure(
-                dimensions_figure(runs, [metric]),
-                f"{TITLES[metric]} of uniform sampling minus that of exploration against run "
-                f"time, hard frames of {', '.join(salons_of_both(runs))}",
+                dimensions_figure(runs, [metric], claim),
+                f"{TITLES[metric]} of {COMPARED[claim][1]} minus that of {COMPARED[claim][0]} "
+                f"against run time, hard frames of {', '.join(salons_of_both(runs, claim))}",
             )
+            for claim in claims_with_salons(runs)
             for metric in METRICS
         ]

@@ -1,0 +1,38 @@
+"""The figures of error differences on scenes of more and more variables."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from analysis.dimensions_plot import dimensions_figure, write_dimensions_figures
+from analysis.runs import find_runs
+
+
+def test_each_learner_has_a_figure_of_its_own(make_method, tmp_path) -> None:
+    make_method("active_exploration", scene="salon-5")
+    make_method("ours_uniform", scene="salon-5")
+    assert write_dimensions_figures(find_runs(tmp_path)[0], tmp_path) == []
+    make_method("ours_exploring", scene="salon-5")
+    files = write_dimensions_figures(find_runs(tmp_path)[0], tmp_path)
+    assert [file.name for file in files] == ["ours_dimensions.png", "ours_dimensions.svg"]
+    assert "error of ours_uniform minus error of ours_exploring" in files[1].read_text()
+    make_method("uniform", scene="salon-5")
+    files = write_dimensions_figures(find_runs(tmp_path)[0], tmp_path)
+    assert {file.stem for file in files} == {"dimensions", "ours_dimensions"}
+
+
+def test_curves_are_the_uniform_error_less_that_of_exploration(make_method, tmp_path) -> None:
+    folders = {
+        method: make_method(method, scene="salon-7", error=error)
+        for method, error in {"ours_exploring": 0.05, "ours_uniform": 0.2}.items()
+    }
+    errors = {
+        method: np.genfromtxt(folder / "metrics.csv", delimiter=",", names=True)["hard_mae"]
+        for method, folder in folders.items()
+    }
+    figure = dimensions_figure(find_runs(tmp_path)[0], ["mae"], "ours_dimensions")
+    curve = figure.axes[0].lines[0]
+    assert curve.get_label() == "salon-7"
+    np.testing.assert_allclose(
+        curve.get_ydata(), errors["ours_uniform"] - errors["ours_exploring"], rtol=1e-6
+    )
