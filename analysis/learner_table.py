@@ -1,10 +1,9 @@
 """The tables of ours, beside the paper's method and a denoiser, and of its parts.
 
 `python -m analysis.learner_table` writes them between markers of README.md and of
-docs/learner/README.md, from docs/learner/results.csv and ablation.csv. Both files are those of a
-report (`ngi report`), the latter on runs of `sweeps/learner`; so is minute.csv, of
-`sweeps/minute`. What frames take comes from docs/learner/frames.json, which `ngi benchmark frames`
-writes.
+docs/learner/README.md, from files of docs/learner: results.csv and minute.csv, which are those of
+reports (`ngi report`), the latter on runs of `sweeps/minute`, ablation.csv, which
+`analysis.parts_plot` writes of runs of `sweeps/learner`, and frames.json of `ngi benchmark frames`.
 """
 
 from __future__ import annotations

@@ -7,27 +7,34 @@ import numpy as np
 import pandas as pd
 import pytest
 from PIL import Image
+from scipy import stats
 
-from analysis import parts_of_learner
-from analysis.parts_of_learner import draw, errors_by_part, over_all_scenes, parts_table
+from analysis import parts_plot
+from analysis.parts_of_learner import effect, errors_by_part, errors_of, parts_table
+from analysis.parts_plot import draw
 from analysis.runs import METRICS, find_runs
 
 
 def ablation() -> pd.DataFrame:
     errors = (
-        ("box", "ours", 0.1),
-        ("box", "active_exploration", 0.4),
-        ("box", "ours_without/big_steps", 0.12),
-        ("box", "ours_without/small_steps", 0.11),
-        ("box", "paper_with/big_steps", 0.3),
-        ("box", "paper_with/more", 0.5),
-        ("hall", "ours", 0.2),
-        ("hall", "ours_without/small_steps", 0.3),
-        ("hall", "ours_uniform", 0.18),
-        ("alone", "ours", 0.1),
-        ("partial", "ours_without/small_steps", 0.3),
+        ("box", "ours", 0, 0.1),
+        ("box", "ours", 1, 0.2),
+        ("box", "active_exploration", 0, 0.4),
+        ("box", "ours_without/big_steps", 0, 0.12),
+        ("box", "ours_without/big_steps", 1, 0.28),
+        ("box", "ours_without/small_steps", 0, 0.11),
+        ("box", "paper_with/big_steps", 0, 0.3),
+        ("box", "paper_with/more", 0, 0.5),
+        ("hall", "ours", 0, 0.2),
+        ("hall", "ours_without/small_steps", 0, 0.3),
+        ("hall", "ours_uniform", 0, 0.18),
+        ("alone", "ours", 0, 0.1),
+        ("partial", "ours_without/small_steps", 0, 0.3),
     )
-    rows = [{"scene": s, "method": m, **{f"hard_{k}": e for k in METRICS}} for s, m, e in errors]
+    rows = [
+        {"scene": s, "method": m, "seed": seed, **{f"hard_{k}": e for k in METRICS}}
+        for s, m, seed, e in errors
+    ]
     rows[0] |= {"hard_mape": 0.2, "hard_dssim": 0.05}  # the same geometric mean
     return pd.DataFrame(rows)
 
@@ -36,30 +43,36 @@ def test_parts_are_compared_with_the_whole_that_they_belong_to() -> None:
     assert parts_table(ablation()).splitlines() == [
         "| taken out of ours | box | hall | all of them |",
         "| :-- | --: | --: | --: |",
-        "| *nothing* | **0.1000** | **0.2000** |  |",
-        "| small steps | 0.1100 (+10%) | 0.3000 (+50%) | +28% |",
-        "| big steps | 0.1200 (+20%) |  | +20% |",
-        "| sobol sequence |  | 0.1800 (-10%) | -10% |",
+        "| *nothing* | **0.1500** | **0.2000** |  |",
+        "| big steps | 0.2000 (+30 ± 127 %) |  | +30 ± 127 % |",
+        "| small steps | 0.1100 (+10 %) | 0.3000 (+50 %) | +30 ± 254 % |",
+        "| sobol sequence |  | 0.1800 (-10 %) | -10 % |",
         "",
         "| added to the paper's method | box | all of them |",
         "| :-- | --: | --: |",
         "| *nothing* | **0.4000** |  |",
-        "| big steps | 0.3000 (-25%) | -25% |",
-        "| more | 0.5000 (+25%) | +25% |",
+        "| big steps | 0.3000 (-25 %) | -25 % |",
+        "| more | 0.5000 (+25 %) | +25 % |",
     ]
 
 
-def test_effects_are_geometric_means_over_scenes() -> None:
-    effects = over_all_scenes(errors_by_part(ablation(), "ours"))
-    assert effects["small_steps"] == pytest.approx(np.sqrt(1.1 * 1.5) - 1)
-    assert effects[""] == 0
-    assert errors_by_part(ablation().iloc[[2, 3]], "ours").empty
+def test_effects_are_paired_by_scene_and_seed() -> None:
+    errors = errors_by_part(ablation(), "ours")
+    found = effect(errors, "big_steps")
+    paired = stats.ttest_rel([0.12 / 0.1, 0.28 / 0.2], [1, 1]).confidence_interval()
+    assert found.n == 2
+    assert found.mean - (found.half_width or 0) == pytest.approx(paired.low)
+    assert found.mean + (found.half_width or 0) == pytest.approx(paired.high)
+    assert effect(errors, "sobol_sequence").half_width is None
+    assert effect(errors, "").mean == 0
+    assert errors_by_part(ablation().iloc[[3, 5]], "ours").empty
 
 
 @pytest.fixture
 def folder(tmp_path, make_method):
     for scene in ("box", "hall"):
         make_method("ours", scene=scene, error=0.1)
+        make_method("ours", scene=scene, seed=1, error=0.1)
         make_method("ours_without/big_steps", scene=scene, error=0.2)
         make_method("active_exploration", scene=scene, error=0.4)
         make_method("paper_with/big_steps", scene=scene, error=0.3)
@@ -68,11 +81,15 @@ def folder(tmp_path, make_method):
 
 def test_the_picture_has_a_panel_per_ablation_and_scene(folder, tmp_path, monkeypatch) -> None:
     runs, _ = find_runs(folder)
-    assert len(runs) == 8
-    picture = tmp_path / "parts.png"
-    monkeypatch.setattr(sys, "argv", ["parts_of_learner", str(folder), str(picture)])
-    assert parts_of_learner.main() == 0
+    assert len(runs) == 10
+    output = tmp_path / "report" / "learner"
+    monkeypatch.setattr(sys, "argv", ["parts_plot", str(folder), str(output)])
+    assert parts_plot.main() == 0
+    picture = output / "parts.png"
     assert picture.read_bytes() == draw(runs)
+    written = pd.read_csv(output / "ablation.csv")
+    assert parts_table(written) == parts_table(errors_of(runs))
+    assert list(written[written["scene"] == "box"]["seed"]) == [0, 0, 1, 0, 0]
     pixels = np.asarray(Image.open(BytesIO(picture.read_bytes())).convert("RGB")).astype(int)
     coloured = (pixels.max(axis=2) - pixels.min(axis=2)) > 60
     height, width = coloured.shape
@@ -85,8 +102,8 @@ def test_runs_without_a_whole_method_are_refused(folder, tmp_path, monkeypatch, 
     runs = [run for run in find_runs(folder)[0] if run.label["method"] != "active_exploration"]
     with pytest.raises(ValueError, match="no runs of active_exploration with its parts"):
         draw(runs)
-    monkeypatch.setattr(sys, "argv", ["parts_of_learner", str(tmp_path / "none"), "a.png"])
-    assert parts_of_learner.main() == 1
-    monkeypatch.setattr(sys, "argv", ["parts_of_learner"])
-    assert parts_of_learner.main() == 2
-    assert "PICTURE.png" in capsys.readouterr().err
+    monkeypatch.setattr(sys, "argv", ["parts_plot", str(tmp_path / "none"), "a"])
+    assert parts_plot.main() == 1
+    monkeypatch.setattr(sys, "argv", ["parts_plot"])
+    assert parts_plot.main() == 2
+    assert "FOLDER OUTPUT" in capsys.readouterr().err
