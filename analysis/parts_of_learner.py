@@ -7,6 +7,7 @@ and the numbers of a folder's runs.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -23,19 +24,37 @@ ABLATIONS = {  # of a whole method: prefix of its runs, caption
 OTHER_NAMES = {"ours_uniform": "ours_without/sobol_sequence"}
 """Methods that leave a part out and are not named after it."""
 
+BELONGING = {*ABLATIONS, *OTHER_NAMES, *(prefix for prefix, _ in ABLATIONS.values())}
+
 WORK = ("steps", "patches_traced", "run_seconds")
 
 
 def errors_of(runs: Sequence[Run]) -> pd.DataFrame:
-    """A row per run of `sweeps/learner`: scene, method, seed, errors on hard frames, `WORK`."""
+    """A row per run of `sweeps/learner`: scene, method, seed, errors on hard frames, `WORK`.
+
+    Runs that belong to neither ablation are left out. Raises ValueError where a method has two runs
+    of one scene and seed.
+    """
+    rows: dict[tuple[str, str, int], dict[str, Any]] = {}
+    for run in runs:
+        method = run.label.get("method") or ""
+        if method.partition("/")[0] not in BELONGING:
+            continue
+        key = run.scene, method, run.seed
+        if key in rows:
+            raise ValueError(
+                f"two runs of {method} on {run.scene} with seed {run.seed}, {run.folder} is one; "
+                "give a folder that holds one sweep alone"
+            )
+        rows[key] = {
+            **{f"hard_{metric}": run.history[f"hard_{metric}"].iloc[-1] for metric in METRICS},
+            **{name: run.result[name] for name in WORK},
+        }
+    columns = ["scene", "method", "seed"]
     return pd.DataFrame(
-        [
-            {"scene": run.scene, "method": run.label["method"], "seed": run.seed}
-            | {f"hard_{metric}": run.history[f"hard_{metric}"].iloc[-1] for metric in METRICS}
-            | {key: run.result[key] for key in WORK}
-            for run in runs
-        ]
-    ).sort_values(["scene", "method", "seed"])
+        [{**dict(zip(columns, key, strict=True)), **rows[key]} for key in sorted(rows)],
+        columns=[*columns, *(f"hard_{metric}" for metric in METRICS), *WORK],
+    )
 
 
 def errors_by_part(results: pd.DataFrame, whole: str) -> pd.DataFrame:

@@ -50,7 +50,7 @@ def draw(runs: Sequence[Run]) -> bytes:
     """
     by_name: dict[tuple[str, str], list[Run]] = {}
     for run in runs:
-        method = run.label["method"]
+        method = run.label.get("method") or ""
         by_name.setdefault((run.scene, OTHER_NAMES.get(method, method)), []).append(run)
     tables = {whole: errors_by_part(errors_of(runs), whole) for whole in ABLATIONS}
     if missing := [whole for whole, table in tables.items() if table.empty]:

@@ -98,6 +98,15 @@ def test_the_picture_has_a_panel_per_ablation_and_scene(folder, tmp_path, monkey
             assert coloured[row, column].any()
 
 
+def test_other_runs_are_left_out_and_two_of_one_kind_refused(folder, make_method) -> None:
+    here = errors_of(find_runs(folder)[0])
+    make_method("ours_exploring", scene="box")
+    assert errors_of(find_runs(folder)[0]).equals(here)
+    make_method("ours", scene="box", budget="small")
+    with pytest.raises(ValueError, match="two runs of ours on box with seed 0"):
+        errors_of(find_runs(folder)[0])
+
+
 def test_runs_without_a_whole_method_are_refused(folder, tmp_path, monkeypatch, capsys) -> None:
     runs = [run for run in find_runs(folder)[0] if run.label["method"] != "active_exploration"]
     with pytest.raises(ValueError, match="no runs of active_exploration with its parts"):
