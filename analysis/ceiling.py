@@ -11,7 +11,7 @@ from typing import Any
 import pandas as pd
 
 from analysis.statistics import Estimate, paired_difference
-from analysis.tables import MISSING, Cell, Table, to_markdown
+from analysis.tables import MISSING, Cell, Table, format_percent, to_markdown
 
 BASELINE = "uniform"
 
@@ -118,11 +118,9 @@ def _by_pair(runs: pd.DataFrame, choice: str, error: str) -> dict[int, float]:
 def _text(row: dict[Hashable, Any] | None) -> str:
     if row is None:
         return MISSING
-    found = Estimate(row["difference"], row["half_width"], int(row["seeds"]))
-    spread = (
-        "" if found.half_width != found.half_width else f" ± {100 * (found.half_width or 0):.1f}"
-    )
-    return f"{100 * found.mean:+.1f}{spread} % ({found.n})"
+    half_width = None if pd.isna(row["half_width"]) else row["half_width"]
+    found = Estimate(row["difference"], half_width, int(row["seeds"]))
+    return f"{format_percent(found)} ({found.n})"
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -14,7 +14,8 @@ import pandas as pd
 
 from analysis.readme_table import markdown_row
 from analysis.runs import METRICS, Run
-from analysis.statistics import Estimate, estimate
+from analysis.statistics import Estimate, paired_difference
+from analysis.tables import format_percent
 
 ABLATIONS = {  # of a whole method: prefix of its runs, caption
     "ours": ("ours_without", "taken out of ours"),
@@ -76,18 +77,23 @@ def errors_by_part(results: pd.DataFrame, whole: str) -> pd.DataFrame:
     if "" not in table.index:
         return table.iloc[:0]
     table = table.loc[:, table.loc[""].notna() & table.drop(index="").notna().any()]
-    gains = pd.Series({part: effect(table, part).mean for part in table.index if part})
-    return table.loc[["", *gains.sort_values(ascending=prefix == "paper_with").index]]
+    gains = effects(table).sort_values(ascending=prefix == "paper_with")
+    return table.loc[["", *gains.index]]
 
 
-def effect(errors: pd.DataFrame, part: str) -> Estimate:
+def effects(errors: pd.DataFrame) -> pd.Series:
+    """[parts] the mean of each part's `effect`; the whole method has none."""
+    found = {part: effect(errors, part) for part in errors.index if part}
+    return pd.Series({part: estimate.mean for part, estimate in found.items() if estimate})
+
+
+def effect(errors: pd.DataFrame, part: str) -> Estimate | None:
     """Relative difference of a part to the whole method, the mean over scenes and seeds.
 
     errors: as from `errors_by_part`, all or some of its columns. Every scene's every seed is one
-    pair, and the interval that of their mean.
+    pair, and the interval that of their mean. None where there is no run of the part.
     """
-    differences = (errors / errors.loc[""] - 1).loc[part].to_numpy()
-    return estimate(differences[~np.isnan(differences)].tolist())
+    return paired_difference(errors.loc[""].to_dict(), errors.loc[part].dropna().to_dict())
 
 
 def parts_table(results: pd.DataFrame) -> str:
@@ -109,18 +115,14 @@ def _table(errors: pd.DataFrame, whole: str) -> str:
             lines.append(markdown_row(["*nothing*", *cells, ""]))
             continue
         cells = [
-            f"{of_scene.loc[part].mean():.4f} ({_percent(effect(of_scene, part))})"
-            if of_scene.loc[part].notna().any()
+            f"{of_scene.loc[part].mean():.4f} ({format_percent(found, 0)})"
+            if (found := effect(of_scene, part))
             else ""
             for of_scene in here
         ]
-        lines.append(markdown_row([title(part), *cells, _percent(effect(errors, part))]))
+        overall = format_percent(effect(errors, part), 0)
+        lines.append(markdown_row([title(part), *cells, overall]))
     return "\n".join(lines)
-
-
-def _percent(difference: Estimate) -> str:
-    spread = "" if difference.half_width is None else f" ± {100 * difference.half_width:.0f}"
-    return f"{100 * difference.mean:+.0f}{spread} %"
 
 
 def title(part: str) -> str:

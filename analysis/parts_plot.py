@@ -21,7 +21,7 @@ from analysis.curves import error_curve
 from analysis.parts_of_learner import (
     ABLATIONS,
     OTHER_NAMES,
-    effect,
+    effects,
     errors_by_part,
     errors_of,
     title,
@@ -52,7 +52,8 @@ def draw(runs: Sequence[Run]) -> bytes:
     for run in runs:
         method = run.label.get("method") or ""
         by_name.setdefault((run.scene, OTHER_NAMES.get(method, method)), []).append(run)
-    tables = {whole: errors_by_part(errors_of(runs), whole) for whole in ABLATIONS}
+    errors = errors_of(runs)
+    tables = {whole: errors_by_part(errors, whole) for whole in ABLATIONS}
     if missing := [whole for whole, table in tables.items() if table.empty]:
         raise ValueError(f"no runs of {', '.join(missing)} with its parts: run sweeps/learner")
     styles = _styles(tables.values())
@@ -77,11 +78,8 @@ def draw(runs: Sequence[Run]) -> bytes:
 
 def _styles(tables: Iterable[pd.DataFrame]) -> dict[str, dict[str, Any]]:
     """Of the parts that have a colour, and of the whole method, ''."""
-    effects = [
-        pd.Series({part: abs(effect(table, part).mean) for part in table.index if part})
-        for table in tables
-    ]
-    named = dict.fromkeys(part for sizes in effects for part in sizes.nlargest(NAMED).index)
+    sizes = [effects(table).abs() for table in tables]
+    named = dict.fromkeys(part for size in sizes for part in size.nlargest(NAMED).index)
     styles: dict[str, dict[str, Any]] = {"": {"color": "black", "linewidth": 2.2}}
     for index, part in enumerate(named):
         colours = COLOURS[:-1]  # the last is black

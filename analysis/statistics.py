@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy import stats
@@ -38,11 +39,11 @@ def estimate(values: Sequence[float]) -> Estimate:
     return Estimate(mean, float(quantile * standard_error), n)
 
 
-def paired_difference(baseline: Mapping[int, float], other: Mapping[int, float]) -> Estimate | None:
+def paired_difference(baseline: Mapping[Any, float], other: Mapping[Any, float]) -> Estimate | None:
     """Relative difference (other - baseline) / baseline over the seeds both have.
 
-    Maps a seed to its value. Pairing takes out what the seed alone does to both. None where no
-    seed is shared, a mean of NaN where a baseline is 0.
+    Maps a seed, or scene and seed, to its value. Pairing takes out what the seed alone does to
+    both. None where no seed is shared, a mean of NaN where a baseline is 0.
     """
     seeds = sorted(baseline.keys() & other.keys())
     if not seeds:

@@ -132,12 +132,12 @@ def format_estimate(value: Estimate) -> str:
     return f"{format_number(value.mean)} ± {format_number(value.half_width, decimals)}"
 
 
-def format_percent(value: Estimate | None) -> str:
+def format_percent(value: Estimate | None, decimals: int = 1) -> str:
     """'-12.3 ± 4.5 %'; missing too where it is undefined, for a baseline of 0."""
     if value is None or math.isnan(value.mean):
         return MISSING
-    interval = "" if value.half_width is None else f" ± {100 * value.half_width:.1f}"
-    return f"{100 * value.mean:+.1f}{interval} %"
+    interval = "" if value.half_width is None else f" ± {100 * value.half_width:.{decimals}f}"
+    return f"{100 * value.mean:+.{decimals}f}{interval} %"
 
 
 def _decimals(value: float) -> int:
