@@ -10,6 +10,7 @@ from typing import Any
 
 import pandas as pd
 
+from analysis.command import errors_in_a_line
 from analysis.statistics import Estimate, paired_difference
 from analysis.tables import MISSING, Cell, Table, format_percent, to_markdown
 
@@ -123,6 +124,7 @@ def _text(row: dict[Hashable, Any] | None) -> str:
     return f"{format_percent(found)} ({found.n})"
 
 
+@errors_in_a_line
 def main(argv: Sequence[str] | None = None) -> int:
     """Writes the tables; returns the exit status, 1 where there is nothing to read."""
     parser = argparse.ArgumentParser(
@@ -133,11 +135,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("folder", metavar="FOLDER", type=Path)
     parser.add_argument("--output", metavar="PATH", type=Path, help="default: FOLDER")
     arguments = parser.parse_args(argv)
-    try:
-        runs = read_runs(arguments.folder)
-    except ValueError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
+    runs = read_runs(arguments.folder)
     output = arguments.output or arguments.folder
     output.mkdir(parents=True, exist_ok=True)
     found = differences(runs)

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
+from analysis.command import errors_in_a_line
 from analysis.statistics import LEVEL
 
 QUANTITIES = {
@@ -70,6 +71,7 @@ def _trend(hours: np.ndarray, values: np.ndarray) -> tuple[float, float]:
     return float(line.slope), float(quantile * line.stderr)
 
 
+@errors_in_a_line
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point of `python -m analysis.endurance`."""
     parser = argparse.ArgumentParser(
@@ -78,12 +80,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("run", type=Path, help="a run's folder, which holds metrics.csv")
     folder = parser.parse_args(arguments).run
-    try:
-        table = endurance(folder)
-    except (ValueError, OSError) as error:
-        print(error, file=sys.stderr)
-        return 2
-    print(table.to_markdown(index=False, floatfmt=".4g"))
+    print(endurance(folder).to_markdown(index=False, floatfmt=".4g"))
     return 0
 
 

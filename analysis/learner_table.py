@@ -16,6 +16,7 @@ from typing import Any
 
 import pandas as pd
 
+from analysis.command import errors_in_a_line
 from analysis.parts_of_frames import frames_table
 from analysis.parts_of_learner import parts_table
 from analysis.readme_table import between_markers, markdown_row
@@ -101,19 +102,16 @@ def with_frames(page: str, benchmark: Mapping[str, Any]) -> str:
     return between_markers(page, frames_table(benchmark["figures"]), begin=begin, end=end)
 
 
+@errors_in_a_line
 def main() -> int:
     """Entry point; returns the exit status."""
-    try:
-        results = pd.read_csv(RESULTS)
-        for page in PAGES:
-            page.write_text(written(page.read_text(), results, page))
-        page = Path("docs/learner/README.md")
-        text = with_parts(page.read_text(), pd.read_csv(ABLATION))
-        text = with_minute(text, pd.read_csv(MINUTE))
-        page.write_text(with_frames(text, json.loads(FRAMES.read_text())))
-    except (OSError, ValueError) as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
+    results = pd.read_csv(RESULTS)
+    for page in PAGES:
+        page.write_text(written(page.read_text(), results, page))
+    page = Path("docs/learner/README.md")
+    text = with_parts(page.read_text(), pd.read_csv(ABLATION))
+    text = with_minute(text, pd.read_csv(MINUTE))
+    page.write_text(with_frames(text, json.loads(FRAMES.read_text())))
     return 0
 
 

@@ -17,6 +17,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
+from analysis.command import errors_in_a_line
 from analysis.curves import error_curve
 from analysis.parts_of_learner import (
     ABLATIONS,
@@ -111,20 +112,17 @@ def _with_one_error(runs: Sequence[Run]) -> list[Run]:
     return [replace(run, history=history) for run, history in zip(runs, histories, strict=True)]
 
 
+@errors_in_a_line
 def main() -> int:
     """Entry point; returns the exit status."""
     if len(sys.argv) != 3:
         print(__doc__, file=sys.stderr)
         return 2
-    try:
-        runs, output = find_runs(Path(sys.argv[1]))[0], Path(sys.argv[2])
-        picture = draw(runs)
-        output.mkdir(parents=True, exist_ok=True)
-        (output / "parts.png").write_bytes(picture)
-        errors_of(runs).to_csv(output / "ablation.csv", index=False, float_format="%.6g")
-    except (OSError, ValueError) as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
+    runs, output = find_runs(Path(sys.argv[1]))[0], Path(sys.argv[2])
+    picture = draw(runs)
+    output.mkdir(parents=True, exist_ok=True)
+    (output / "parts.png").write_bytes(picture)
+    errors_of(runs).to_csv(output / "ablation.csv", index=False, float_format="%.6g")
     return 0
 
 

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from analysis.claims import CLAIMS
+from analysis.command import errors_in_a_line
 from analysis.evidence import Verdict
 
 BEGIN, END = "<!-- claims: written by analysis.readme_table -->", "<!-- end of claims -->"
@@ -65,6 +66,7 @@ def between_markers(page: str, table: str, *, begin: str, end: str) -> str:
     return pattern.sub(lambda _: f"{begin}\n\n{table}\n\n{end}", page)
 
 
+@errors_in_a_line
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit status."""
     arguments = sys.argv[1:] if argv is None else argv
@@ -72,11 +74,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(__doc__, file=sys.stderr)
         return 2
     results, readme = map(Path, arguments)
-    try:
-        readme.write_text(with_table(readme.read_text(), readme_table(results.read_text())))
-    except (OSError, ValueError) as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
+    readme.write_text(with_table(readme.read_text(), readme_table(results.read_text())))
     return 0
 
 

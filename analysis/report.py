@@ -16,6 +16,7 @@ from tqdm import tqdm
 
 from analysis.claim_tables import claims_table
 from analysis.claims import CLAIMS
+from analysis.command import errors_in_a_line
 from analysis.dimensions_plot import write_dimensions_figures
 from analysis.exploration import exploration_table
 from analysis.exploration_plots import write_exploration_figures
@@ -170,6 +171,7 @@ def _notes(runs: Sequence[Run]) -> list[str]:
     return notes
 
 
+@errors_in_a_line
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit status, 1 where there is nothing that can be reported."""
     parser = argparse.ArgumentParser(
@@ -190,11 +192,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         help="log the tables at Weights & Biases; see docs/guide/wandb",
     )
     arguments = parser.parse_args(argv)
-    try:
-        report = write_report(arguments.folder, arguments.output or arguments.folder / "report")
-    except ValueError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
+    report = write_report(arguments.folder, arguments.output or arguments.folder / "report")
     print(report.text)
     for warning in report.warnings:
         print(f"warning: {warning}", file=sys.stderr)

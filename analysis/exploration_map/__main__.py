@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
 
+from analysis.command import errors_in_a_line
 from analysis.exploration_map.curves import write_curves
 from analysis.exploration_map.heat_maps import REUSE, write_heat_maps
 from analysis.exploration_map.runs import ERRORS, read_table
@@ -41,6 +42,7 @@ def write_map(folder: Path, output: Path) -> list[Path]:
     ]
 
 
+@errors_in_a_line
 def main(argv: Sequence[str] | None = None) -> int:
     """Draws the map; returns the exit status, 1 where there is nothing to draw."""
     parser = argparse.ArgumentParser(
@@ -54,11 +56,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         "--output", metavar="PATH", type=Path, help="where to write; by default FOLDER/map"
     )
     arguments = parser.parse_args(argv)
-    try:
-        files = write_map(arguments.folder, arguments.output or arguments.folder / "map")
-    except ValueError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
+    files = write_map(arguments.folder, arguments.output or arguments.folder / "map")
     print("Written:")
     for file in files:
         print(f"  {file}")

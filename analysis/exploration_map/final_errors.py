@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from analysis.command import errors_in_a_line
 from analysis.exploration_map.heat_maps import cell_text
 from analysis.exploration_map.runs import BASE, SAMPLERS, SETTING, UNIFORM, read_table
 from analysis.exploration_map.speedup import Comparison
@@ -87,6 +88,7 @@ def _time(rows: pd.DataFrame, sampler: str, error: str) -> str:
     return cell_text(dict(asdict(found).items()))
 
 
+@errors_in_a_line
 def main(argv: Sequence[str] | None = None) -> int:
     """Writes the table; returns the exit status, 1 where there is nothing to read."""
     parser = argparse.ArgumentParser(
@@ -97,11 +99,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("folders", metavar="FOLDER", type=Path, nargs="+")
     parser.add_argument("--output", metavar="FILE", type=Path, required=True, help="Markdown")
     arguments = parser.parse_args(argv)
-    try:
-        tables = [final_errors(read_table(folder)) for folder in arguments.folders]
-    except ValueError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
+    tables = [final_errors(read_table(folder)) for folder in arguments.folders]
     text = "\n\n".join(map(to_markdown, tables)) + "\n"
     arguments.output.write_text(text)
     print(text)
