@@ -7,11 +7,9 @@ from typing import Any
 
 from analysis.readme_table import markdown_row
 
-RATIO = "ours / paths and denoiser"
-
 
 def frames_table(figures: Sequence[Mapping[str, Any]]) -> str:
-    """A row per scene and resolution, a column per part: medians, in ms but for the last.
+    """A row per scene and resolution, a column per part: medians, in ms but for the ratios.
 
     figures: those of the benchmark's JSON file; parts other than 'frames' are left out
     Raises ValueError where a scene lacks a part that another one has.
@@ -21,7 +19,7 @@ def frames_table(figures: Sequence[Mapping[str, Any]]) -> str:
         if figure["part"] == "frames":
             part, size = figure["name"].rsplit(", ", 1)
             row = cells.setdefault((figure["scene"], int(size.split()[0])), {})
-            row[part] = f"{figure['median']:.2f}" if part == RATIO else f"{figure['median']:,.0f}"
+            row[part] = f"{figure['median']:{',.0f' if figure['unit'] == 'ms' else '.2f'}}"
     parts = list(dict.fromkeys(part for row in cells.values() for part in row))
     lines = [["scene", "pixels", *parts], [":--", *["--:"] * (len(parts) + 1)]]
     for (scene, size), row in cells.items():

@@ -71,16 +71,16 @@ def test_a_scene_that_a_method_has_not_trained_on_is_named() -> None:
         with_minute(page, minute)
 
 
-def frame_figure(name: str, median: float, *, scene: str = "box", part: str = "frames") -> dict:
-    return {"name": name, "median": median, "scene": scene, "part": part, "unit": "ms"}
+def frame_figure(name: str, median: float, unit: str = "ms", *, part: str = "frames") -> dict:
+    return {"name": name, "median": median, "scene": "box", "part": part, "unit": unit}
 
 
 def test_frames_have_a_row_per_scene_and_resolution() -> None:
     figures = [
         frame_figure("rays, all of them, 96 × 96", 1234.4),
-        frame_figure("ours / paths and denoiser, 96 × 96", 0.456),
+        frame_figure("ours / paths and denoiser, 96 × 96", 0.456, "×"),
         frame_figure("rays, all of them, 256 × 256", 2.5),
-        frame_figure("ours / paths and denoiser, 256 × 256", 1.0),
+        frame_figure("ours / paths and denoiser, 256 × 256", 1.0, "×"),
         frame_figure("step, 8x512", 1.0, part="training"),
     ]
     assert frames_table(figures).splitlines() == [

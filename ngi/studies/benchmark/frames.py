@@ -24,6 +24,8 @@ FEATURES, LAYERS = 128, 6
 """Of the network of `budget=small`."""
 SAMPLES_PER_PIXEL = 8
 """Of the paths that are denoised."""
+FEWER_RAYS = 8
+"""Per pixel, of buffers that take half the rays (`renderer.buffer_samples=8`)."""
 
 
 def frames(scene: Scene, *, repeats: int, seconds: float) -> list[Figure]:
@@ -81,30 +83,41 @@ def _frames(
     def next_v() -> Tensor:
         return hard[next(numbers) % len(hard)]
 
-    of_buffers, of_network, of_paths, of_denoiser = in_turn(
+    of_buffers, of_fewer_rays, of_network, of_paths, of_denoiser = in_turn(
         repeats,
         f"frames, {resolution} pixels",
         lambda: renderer.image_buffers(next_v(), resolution=resolution),
+        lambda: renderer.image_buffers(next_v(), resolution=resolution, samples=FEWER_RAYS),
         lambda: show(network, buffers, next_v(), bits),
         lambda: tracing.trace(next_v(), resolution=resolution),
         partial(tracing.denoise, noisy, buffers),
         seconds=seconds,
     )
-    ours = [a + b for a, b in zip(of_buffers, of_network, strict=True)]
-    denoised = [a + b for a, b in zip(of_paths, of_denoiser, strict=True)]
+    ours = _sums(of_buffers, of_network)
+    with_fewer = _sums(of_fewer_rays, of_network)
+    denoised = _sums(of_paths, of_denoiser)
     size = f"{resolution} × {resolution}"
     parts = {
         "buffers with direct light": of_buffers,
+        f"the same, {FEWER_RAYS} rays per pixel": of_fewer_rays,
         f"network {LAYERS}x{FEATURES}": of_network,
         "ours": ours,
         f"paths, {SAMPLES_PER_PIXEL} samples per pixel": of_paths,
         "denoiser": of_denoiser,
         "paths and denoiser": denoised,
     }
+    shares = {"ours": ours, f"ours with {FEWER_RAYS} rays": with_fewer}
     return [
         *(
             figure(f"{part}, {size}", [1e3 * t for t in times], "ms")
             for part, times in parts.items()
         ),
-        figure(f"ours / paths and denoiser, {size}", ratio(ours, denoised), "×", "≤ 0.5"),
+        *(
+            figure(f"{name} / paths and denoiser, {size}", ratio(times, denoised), "×", "≤ 0.5")
+            for name, times in shares.items()
+        ),
     ]
+
+
+def _sums(of_one: list[float], of_another: list[float]) -> list[float]:
+    return [a + b for a, b in zip(of_one, of_another, strict=True)]

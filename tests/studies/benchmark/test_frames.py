@@ -1,6 +1,7 @@
 import pytest
 
 from ngi.machine.backend import llvm_problem
+from ngi.render.mitsuba_renderer import MitsubaRenderer
 from ngi.studies.benchmark import frames, viewer
 from ngi.studies.benchmark.scenes import shipped
 
@@ -9,16 +10,28 @@ from ngi.studies.benchmark.scenes import shipped
 
 @pytest.mark.skipif(llvm_problem() is not None, reason=str(llvm_problem()))
 def test_frames_take_as_long_as_their_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    traced = []
+
+    class Counted(MitsubaRenderer):
+        def image_buffers(self, v, *, resolution, samples=None):
+            traced.append((resolution, samples))
+            return super().image_buffers(v, resolution=resolution, samples=samples)
+
     monkeypatch.setattr(frames, "RESOLUTIONS", (24, 32))
+    monkeypatch.setattr(frames, "MitsubaRenderer", Counted)
     figures = frames.frames(MIRROR, repeats=1, seconds=60)
-    assert len(figures) == 2 * 7
-    for resolution, of_one in ((24, figures[:7]), (32, figures[7:])):
+    assert len(figures) == 2 * 9
+    for resolution, of_one in ((24, figures[:9]), (32, figures[9:])):
         assert all(f.name.endswith(f"{resolution} × {resolution}") for f in of_one)
-        buffers, network, ours, paths, denoiser, denoised, share = (f.median for f in of_one)
-        assert min(buffers, network, paths, denoiser) > 0
+        buffers, fewer, network, ours, paths, denoiser, denoised, share, share_of_fewer = (
+            f.median for f in of_one
+        )
+        assert min(buffers, fewer, network, paths, denoiser) > 0
         assert ours == pytest.approx(buffers + network)
         assert denoised == pytest.approx(paths + denoiser)
         assert share == pytest.approx(ours / denoised)
+        assert share_of_fewer == pytest.approx((fewer + network) / denoised)
+        assert {rays for size, rays in traced if size == resolution} == {None, 8}
 
 
 @pytest.mark.skipif(llvm_problem() is not None, reason=str(llvm_problem()))
