@@ -2,7 +2,7 @@
 
 from omegaconf import DictConfig, open_dict
 
-from tests.config.test_configuration import composed
+from tests.config.command_line import composed
 
 
 def run_config(*overrides: str) -> DictConfig:

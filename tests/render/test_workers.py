@@ -22,7 +22,7 @@ from ngi.render.worker_process import WorkerProcess, visible_gpus
 from ngi.render.worker_protocol import Request
 from ngi.render.workers import WorkerRenderer, mitsuba_renderer
 from ngi.scene import read_scene, scenes
-from tests.config.test_configuration import composed
+from tests.config.command_line import composed
 from tests.render.odd_renderer import (
     OddRenderer,
     PlaceRenderer,

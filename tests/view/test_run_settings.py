@@ -11,7 +11,7 @@ from ngi.config.configuration import scene_place
 from ngi.files.resources import root
 from ngi.learn import RunFolder
 from ngi.view.run_settings import RENAMED, describe_scene, made_by
-from tests.config.test_configuration import composed
+from tests.config.command_line import composed
 
 SETTINGS: dict[str, Any] = {
     "scene": {"name": "my-lamp", "hash": "0"},

@@ -1,0 +1,180 @@
+"""Every method differs from the others where its name says, and nowhere else."""
+
+import pytest
+from hydra.utils import instantiate
+from omegaconf import open_dict
+
+from analysis.claims import WITH_OURS
+from tests.config.command_line import CONF, composed
+
+PRECONDITIONED, PLAIN = "pixel_generator", "pixel_generator_no_preconditioning"
+COMPETITORS = ("cnsr", "anf")
+"""Other methods, whose samples are of another size."""
+EXPLORING = {
+    "ours_exploring": "mcmc_loss_step",
+    "ours_loss_target": "mcmc_loss",
+    "ours_metropolis": "mcmc_metropolis",
+}
+OURS = ("ours", "ours_uniform", *EXPLORING)
+LIGHT = ["specular", "direct and caustics"]
+METHODS = {  # sampler, resolution, model, what the renderer traces into the buffers
+    "active_exploration": ("mcmc_loss_step", "growing", PRECONDITIONED, []),
+    "uniform": ("uniform", "constant", PRECONDITIONED, []),
+    "uniform_growing": ("uniform", "growing", PRECONDITIONED, []),
+    "sobol": ("sobol", "constant", PRECONDITIONED, []),
+    "latin_hypercube": ("latin_hypercube", "constant", PRECONDITIONED, []),
+    "fixed_data": ("uniform", "constant", PRECONDITIONED, []),
+    "prioritised_replay": ("uniform", "constant", PRECONDITIONED, []),
+    "constant_resolution": ("mcmc_loss_step", "constant", PRECONDITIONED, []),
+    "loss_target": ("mcmc_loss", "growing", PRECONDITIONED, []),
+    "output_gradient_target": ("mcmc_output_gradient", "growing", PRECONDITIONED, []),
+    "metropolis": ("mcmc_metropolis", "growing", PRECONDITIONED, []),
+    "no_preconditioning": ("mcmc_loss_step", "growing", PLAIN, []),
+    "cnsr": ("uniform", "constant", "cnsr", []),
+    "anf": ("uniform", "constant", "anf", []),
+    "traced_specular": ("mcmc_loss_step", "growing", PRECONDITIONED, ["specular"]),
+    "ours": ("sobol", "constant", "encoded_generator", LIGHT),
+    "ours_uniform": ("uniform", "constant", "encoded_generator", LIGHT),
+    **{
+        method: (sampler, "constant", "encoded_generator", LIGHT)
+        for method, sampler in EXPLORING.items()
+    },
+    "traced_direct": ("mcmc_loss_step", "growing", PRECONDITIONED, ["direct"]),
+}
+PRIORITISED = {"_target_": "ngi.reuse.Prioritised", "alpha": 0.6, "beta": 0.4, "epsilon": 1e-6}
+
+
+PATH_TRACING = {  # option, samples per pixel
+    f"path_tracing{name}{suffix}": (option, samples)
+    for name, option in (("", "plain"), ("_oidn", "oidn"), ("_optix", "optix"))
+    for suffix, samples in (("", None), ("_8spp", 8))
+}
+
+
+def test_every_method_is_listed_here() -> None:
+    found = {file.stem for file in (CONF / "method").glob("*.yaml")}
+    assert found == METHODS.keys() | PATH_TRACING.keys()
+
+
+@pytest.mark.parametrize("method", PATH_TRACING)
+def test_path_tracing_takes_the_place_of_training_and_changes_nothing_else(method: str) -> None:
+    config = composed(f"method={method}", "budget=small")
+    chosen, other = config.hydra.runtime.choices, composed("budget=small")
+    assert (chosen.path_tracing, config.path_tracing.samples_per_pixel) == PATH_TRACING[method]
+    assert config.path_tracing.milliseconds is None
+    assert {key: config[key] for key in other if key not in ("hydra", "label")} == {
+        key: other[key] for key in other if key not in ("hydra", "label")
+    }
+    assert "path_tracing" not in other
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_method_differs_where_its_name_says_and_nowhere_else(method: str) -> None:
+    config = composed(f"method={method}", "budget=small")
+    chosen = config.hydra.runtime.choices
+    words = {"learned": "", "traced": "{}", "with_caustics": "{} and caustics"}
+    traced = [words[config.renderer[name]].format(name) for name in ("specular", "direct")]
+    traced = [name for name in traced if name]
+    found = (chosen.sampler, chosen.resolution, chosen.model, traced)
+    assert found == METHODS[method]
+    assert config.label.method == method
+    other = composed("budget=small")
+    if method == "fixed_data":
+        other.reuse = composed("budget=small", "reuse=epochs").reuse
+    if method == "prioritised_replay":
+        with open_dict(other):
+            other.reuse.store.rule = PRIORITISED
+    parts = ("scene", "budget", "evaluation", "trainer")
+    own = () if method in COMPETITORS else ("data", "reuse", "loss")
+    own = () if method in OURS else ("optimizer", "schedule", "averaging", *own)
+    for part in (*parts, *own):
+        assert config[part] == other[part], part
+
+
+@pytest.mark.parametrize("method", OURS)
+def test_ours_differs_in_every_part_that_can_be_taken_out_again(method: str) -> None:
+    chosen = composed(f"method={method}", "budget=small").hydra.runtime.choices
+    parts = ("optimizer", "schedule", "averaging", "data", "reuse")
+    options = {part: chosen[part] for part in parts}
+    assert options == {
+        "optimizer": "muon",
+        "schedule": "warmup_stable_decay",
+        "averaging": "exponential",
+        "data": "denoised_patches",
+        "reuse": "steady",
+    }
+
+
+def test_ours_trains_on_images_as_large_as_those_that_are_shown() -> None:
+    for budget, shown in (("small", 96), ("paper", 256)):
+        config = composed("method=ours", f"budget={budget}")
+        schedule = instantiate(config.resolution)
+        assert [schedule.resolution(step) for step in (0, 10**6)] == [shown, shown]
+
+
+def test_the_store_of_a_competitor_holds_as_many_pixels() -> None:
+    config, other = composed("method=cnsr"), composed("method=uniform")
+    images = 1 + config.data.observations
+    pixels = images * config.renderer.patch_size**2 * config.reuse.store.capacity
+    assert pixels == other.renderer.patch_size**2 * other.reuse.store.capacity
+    assert {**config.reuse.policy, "bootstrap_batches": 100} == other.reuse.policy
+    assert config.resolution.start == config.renderer.patch_size == 64
+
+
+@pytest.mark.parametrize("budget", ["smoke", "small", "paper"])
+def test_the_denoiser_gets_8_samples_and_896_patches_whatever_the_budget(budget: str) -> None:
+    config = composed("method=anf", f"budget={budget}")
+    assert config.renderer.samples_per_pixel == 8
+    pixels = config.data.frames * config.renderer.patch_size**2 * config.reuse.store.capacity
+    assert pixels == 896 * composed().renderer.patch_size ** 2
+
+
+CHANGED = {
+    "muon": "optimizer",
+    "decay": "schedule",
+    "averaging": "averaging",
+    "encodings": "model",
+    "relative_positions": "model",
+    "relative_loss": "loss",
+    "camera_left_out": "data",
+    "denoised_targets": "data",
+    "direct_light": "renderer",
+    "caustics": "renderer",
+    "specular_bounces": "renderer",
+    "steady_reuse": "reuse",
+    "large_images": "resolution",
+    "small_batches": "sampler",
+}
+"""The group that each part of ours belongs to."""
+
+
+@pytest.mark.parametrize(
+    ("ablation", "base"), [("ours_without", "ours"), ("paper_with", "active_exploration")]
+)
+def test_an_ablation_of_the_learner_changes_one_part(ablation: str, base: str) -> None:
+    methods = composed("+sweeps=learner").hydra.sweeper.params.method.replace(" ", "").split(",")
+    parts = {m.split("/")[1] for m in methods if m.startswith(ablation)}
+    beside = {"ours_without": set(), "paper_with": {"tuned_adam"}}[ablation]
+    network = {"ours_without": set(), "paper_with": {"relative_positions"}}[ablation]  # only ours
+    assert parts == {*CHANGED} - network | beside
+    whole = composed("budget=small", f"method={base}")
+    for part in parts - beside:
+        group = CHANGED[part]
+        config = composed("budget=small", f"method={ablation}/{part}")
+        assert [key for key in CHANGED.values() if config[key] != whole[key]] == [
+            key for key in CHANGED.values() if key == group
+        ], part
+
+
+@pytest.mark.parametrize(("of_the_paper", "of_ours"), WITH_OURS.items())
+def test_claims_are_judged_with_the_same_samplings_and_our_learner(
+    of_the_paper: str, of_ours: str
+) -> None:
+    """The paper's sampler, but for the number of its chains; all else is that of ours."""
+    paper, ours, learner = (
+        composed("budget=small", f"method={method}") for method in (of_the_paper, of_ours, "ours")
+    )
+    assert ours.sampler == {**paper.sampler, "chains": learner.sampler.chains}
+    parts = ("model", "loss", "optimizer", "schedule", "averaging", "data", "renderer", "reuse")
+    for part in (*parts, "resolution", "budget"):
+        assert ours[part] == learner[part]
