@@ -5,7 +5,7 @@ Tensors only: neither renderer nor network is known here.
 
 from ngi.reuse.archive import PatchArchive
 from ngi.reuse.compact import CompactPatches
-from ngi.reuse.drawing import DrawingRule, Epochs, Prioritised, ProportionalToLoss
+from ngi.reuse.drawing import ByImportance, DrawingRule, Epochs, Prioritised, ProportionalToLoss
 from ngi.reuse.policies import (
     FixedProbability,
     Never,
@@ -18,6 +18,7 @@ from ngi.reuse.reuse import Reuse
 from ngi.reuse.store import PatchStore
 
 __all__ = [
+    "ByImportance",
     "CompactPatches",
     "DrawingRule",
     "Epochs",

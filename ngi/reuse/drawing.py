@@ -108,6 +108,46 @@ class Prioritised(DrawingRule):
         return (losses + self.epsilon) ** self.alpha
 
 
+class Density(Protocol):
+    """What `ByImportance` draws with, such as `ngi.explore.Importance`."""
+
+    @property
+    def weighted(self) -> bool:
+        """Whether losses are weighted back to uniform draws."""
+        ...
+
+    def probabilities(self, values: Tensor) -> Tensor:
+        """Of m patches with these losses, [m] float64 with sum 1."""
+        ...
+
+    def weights(self, probabilities: Tensor) -> Tensor:
+        """[m] float64, factors of their losses."""
+        ...
+
+
+@dataclass(frozen=True)
+class ByImportance(DrawingRule):
+    """With replacement, with a density that is made of the last recorded losses.
+
+    importance: the density, and the factors of the losses
+    """
+
+    importance: Density
+
+    by_loss = True
+
+    def draw(
+        self, losses: Tensor, waiting: Tensor, count: int, generator: torch.Generator
+    ) -> tuple[Tensor, Tensor]:
+        probabilities = self.importance.probabilities(losses)
+        return _draw_in_proportion(probabilities, count, generator), waiting
+
+    def weights(self, losses: Tensor, slots: Tensor) -> Tensor | None:
+        if not self.importance.weighted:
+            return None
+        return self.importance.weights(self.importance.probabilities(losses))[slots]
+
+
 def _draw_in_proportion(priorities: Tensor, count: int, generator: torch.Generator) -> Tensor:
     """[count] int64 indices into `priorities` [m] float64, with replacement; uniform for all 0."""
     cumulative = priorities.cumsum(0)

@@ -1,4 +1,4 @@
-"""Drawing rules beside the paper's: shuffled epochs, and prioritised replay with its weights."""
+"""Drawing rules beside the paper's: shuffled epochs, prioritised replay, importance."""
 
 import io
 
@@ -7,8 +7,16 @@ import pytest
 import torch
 from scipy import stats
 
+from ngi.explore import Importance
 from ngi.patches import BufferLayout
-from ngi.reuse import Epochs, PatchArchive, PatchStore, Prioritised, ProportionalToLoss
+from ngi.reuse import (
+    ByImportance,
+    Epochs,
+    PatchArchive,
+    PatchStore,
+    Prioritised,
+    ProportionalToLoss,
+)
 
 LAYOUT = BufferLayout()
 LOSSES = [0.0, 0.02, 0.3, 0.3, 1.7, 0.9]
@@ -109,6 +117,28 @@ def test_full_correction_makes_the_mean_that_of_uniform_draws(make_patches) -> N
     values = torch.tensor(LOSSES)[ids]
     assert (weights * values).sum() / weights.sum() == pytest.approx(np.mean(LOSSES), rel=0.03)
     assert values.mean() > 1.5 * np.mean(LOSSES)
+
+
+def test_by_importance_most_draws_are_uniform_and_none_is_too_frequent(make_patches) -> None:
+    """Closed form: 0.9 / m and a tenth in proportion to the losses, 1.2 / m at most."""
+    rule = ByImportance(Importance(uniform_share=0.9, largest_ratio=1.2))
+    counts, weights, _ = drawn_and_weighted(make_patches, rule, LOSSES)
+    losses = np.array(LOSSES)
+    expected = 0.9 / 6 + 0.1 * losses / losses.sum()
+    assert expected[4] > 1.2 / 6 > expected[5]
+    room = 1.2 / 6 - np.minimum(expected, 1.2 / 6)
+    expected = np.minimum(expected, 1.2 / 6) + (expected[4] - 1.2 / 6) * room / room.sum()
+    assert stats.chisquare(counts, counts.sum() * expected).pvalue > 1e-3
+    assert weights is None
+
+
+def test_weights_of_importance_make_the_mean_that_of_uniform_draws(make_patches) -> None:
+    rule = ByImportance(Importance(uniform_share=0.5, weighted=True))
+    _, weights, ids = drawn_and_weighted(make_patches, rule, LOSSES)
+    values = torch.tensor(LOSSES)[ids]
+    assert weights.max() <= 2
+    assert (weights * values).mean() == pytest.approx(np.mean(LOSSES), rel=0.02)
+    assert values.mean() > 1.3 * np.mean(LOSSES)
 
 
 def test_the_papers_reuse_is_the_case_of_exponent_1_without_weights(make_patches) -> None:
