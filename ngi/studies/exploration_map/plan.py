@@ -7,6 +7,7 @@ from itertools import product
 
 from ngi.studies.exploration_map.setting import (
     AT_MOST,
+    BY_LOSS,
     METHODS,
     OURS,
     SELF_TUNING,
@@ -81,6 +82,16 @@ def _ours() -> tuple[Setting, ...]:
     )
 
 
+OURS_LONG = Plan(
+    settings=(*_ours(), replace(BASE, volume=0.1), _in_dimensions(2, BASE.volume)),
+    steps=4000,
+    evaluations=40,
+    frames=400,
+    methods=OURS,
+    learner=(*OUR_LEARNER, NOISE_KNOWN),
+    reuse=STEADY,
+)
+
 PLANS = {
     "smoke": Plan(
         settings=(BASE, replace(BASE, volume=0.1, dimensions=2, active=2)),
@@ -108,13 +119,8 @@ PLANS = {
         methods=OURS,
         learner=OUR_LEARNER,
     ),
-    "ours_long": Plan(
-        settings=(*_ours(), replace(BASE, volume=0.1), _in_dimensions(2, BASE.volume)),
-        steps=4000,
-        evaluations=40,
-        frames=400,
-        methods=OURS,
-        learner=(*OUR_LEARNER, NOISE_KNOWN),
-        reuse=STEADY,
+    "ours_long": OURS_LONG,
+    "ours_by_loss": replace(
+        OURS_LONG, methods=tuple(method for method in OURS if method.reuse), reuse=BY_LOSS
     ),
 }

@@ -21,6 +21,8 @@ SELF_TUNING = ("reuse=self_tuning", "reuse.policy.bootstrap_batches=20", "reuse.
 """As in all small budgets: with the paper's 100 and 4.6 hardly a batch would be new."""
 STEADY = ("reuse=steady",)
 """That of `method=ours`, whoever chooses the samples."""
+BY_LOSS = ("reuse=steady_by_loss",)
+"""The same, with a tenth of the stored patches drawn in proportion to their losses."""
 NO_REUSE = ("reuse=never",)
 
 
