@@ -18,8 +18,12 @@ from analysis.exploration_map.tables import knobs_of, setting_name
 from analysis.statistics import estimate, paired_difference
 from analysis.tables import Cell, Table, format_estimate, format_percent, to_markdown
 
+OWN = "uniform_here"
+"""Uniform sampling of a folder whose runs are compared with another one's."""
+
 NAMES = {
     UNIFORM: "uniform",
+    OWN: "uniform, reuse as here",
     **SAMPLERS,
     "known": "a tenth in the pockets",
     "known_weighted": "the same, weighted back",
@@ -70,6 +74,22 @@ def final_errors(table: pd.DataFrame) -> Table:
     return Table("Errors at the end", columns, tuple(rows), 4)
 
 
+def against(table: pd.DataFrame, other: pd.DataFrame) -> pd.DataFrame:
+    """The table with another one's uniform sampling to compare with, and its own beside it.
+
+    Raises ValueError where the other one lacks a setting, a kind of reuse or a seed.
+    """
+    keys = [*SETTING, "reuse", "seed"]
+    wanted = table[keys].drop_duplicates()
+    uniform = other[other["sampler"] == UNIFORM].merge(wanted, on=keys)
+    missing = wanted.merge(uniform[keys].drop_duplicates(), on=keys, how="left", indicator=True)
+    if (lacking := missing[missing["_merge"] == "left_only"]).size:
+        knobs = knobs_of(lacking[SETTING].iloc[0].tolist())
+        seed = lacking["seed"].iloc[0]
+        raise ValueError(f"no uniform sampling to compare with: {setting_name(knobs)}, seed {seed}")
+    return pd.concat([uniform, table.replace({"sampler": {UNIFORM: OWN}})], ignore_index=True)
+
+
 def _difference(runs: pd.DataFrame, sampler: str, error: str) -> str:
     if sampler == UNIFORM:
         return ""
@@ -98,8 +118,17 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("folders", metavar="FOLDER", type=Path, nargs="+")
     parser.add_argument("--output", metavar="FILE", type=Path, required=True, help="Markdown")
+    parser.add_argument(
+        "--against",
+        metavar="FOLDER",
+        type=Path,
+        help="with whose uniform sampling all are compared; by default each folder's own",
+    )
     arguments = parser.parse_args(argv)
-    tables = [final_errors(read_table(folder)) for folder in arguments.folders]
+    runs = [read_table(folder) for folder in arguments.folders]
+    if arguments.against is not None:
+        runs = [against(table, read_table(arguments.against)) for table in runs]
+    tables = [final_errors(table) for table in runs]
     text = "\n\n".join(map(to_markdown, tables)) + "\n"
     arguments.output.write_text(text)
     print(text)

@@ -256,3 +256,29 @@ def test_final_errors_are_those_of_the_last_step_paired_by_seed(
 def test_final_errors_of_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert final_errors_main([str(tmp_path), "--output", str(tmp_path / "final.md")]) == 1
     assert "there is no such file" in capsys.readouterr().err
+
+
+def test_final_errors_can_be_compared_with_another_folders_uniform_sampling(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, rates in (
+        ("steady", {"uniform": 0.001, "predicted": 0.009}),
+        ("by_loss", {"uniform": 0.002, "predicted": 0.003}),
+    ):
+        rows = rows_of(rates)
+        rows["lit"] = 0.25
+        (tmp_path / name).mkdir()
+        rows[rows["reuse"]].to_csv(tmp_path / name / "exploration_map.csv", index=False)
+    words = [str(tmp_path / "by_loss"), "--output", str(tmp_path / "final.md"), "--against"]
+    assert final_errors_main([*words, str(tmp_path / "steady")]) == 0
+    shown = [
+        [cell.strip() for cell in line.split("|")]
+        for line in (tmp_path / "final.md").read_text().splitlines()[-3:]
+    ]
+    assert [cells[4] for cells in shown] == ["uniform", "uniform, reuse as here", "predicted loss"]
+    for cells, rate in zip(shown[1:], (0.002, 0.003), strict=True):
+        assert cells[-5] == f"{100 * math.expm1(1000 * (0.001 - rate)):.1f} ± 0.0 %"
+    fewer = pd.read_csv(tmp_path / "steady" / "exploration_map.csv").query("seed == 0")
+    fewer.to_csv(tmp_path / "steady" / "exploration_map.csv", index=False)
+    assert final_errors_main([*words, str(tmp_path / "steady")]) == 1
+    assert "no uniform sampling to compare with: base, seed 1" in capsys.readouterr().err
