@@ -2,8 +2,9 @@
 
 `python -m analysis.learner_table` writes them between markers of README.md and of
 docs/learner/README.md, from files of docs/learner: results.csv and minute.csv, which are those of
-reports (`ngi report`), the latter on runs of `sweeps/minute`, ablation.csv, which
-`analysis.parts_plot` writes of runs of `sweeps/learner`, and frames.json of `ngi benchmark frames`.
+reports (`ngi report`), the latter on runs of `sweeps/minute`, as are longer.csv and rays.csv, whose
+runs of ours had more time and fewer rays per pixel; ablation.csv, which `analysis.parts_plot`
+writes of runs of `sweeps/learner`, and frames.json of `ngi benchmark frames`.
 """
 
 from __future__ import annotations
@@ -40,6 +41,12 @@ METHODS = {
 }
 """Columns, from the methods' names in the file."""
 
+VARIANTS = {
+    "longer": (Path("docs/learner/longer.csv"), "ours, 300 s"),
+    "rays": (Path("docs/learner/rays.csv"), "ours, 8 rays per pixel"),
+}
+"""What ours of other results is called, and its column, beside `METHODS`."""
+
 PAGES = {
     Path("README.md"): (("mape", "dssim"), list(METHODS)[:3]),
     Path("docs/learner/README.md"): (("mape", "dssim", "mae", "lpips"), list(METHODS)),
@@ -52,7 +59,8 @@ def learner_table(results: pd.DataFrame, metrics: Sequence[str], methods: Sequen
 
     results: the report's table of results; only scenes that have every method are shown
     """
-    heads = ["scene", "seeds", *(METHODS[method] for method in methods)]
+    columns = {**METHODS, **{name: column for name, (_, column) in VARIANTS.items()}}
+    heads = ["scene", "seeds", *(columns[method] for method in methods)]
     lines = [markdown_row(heads), markdown_row([":--", "--:", *[":--"] * len(methods)])]
     rows = results.set_index(["scene", "method"])
     for scene in sorted(set(results["scene"])):
@@ -96,6 +104,20 @@ def with_minute(page: str, results: pd.DataFrame) -> str:
     return between_markers(page, table, begin=begin, end=end)
 
 
+def with_variant(page: str, results: pd.DataFrame, variant: pd.DataFrame, name: str) -> str:
+    """The page with a table of ours, of a variant of it, and of the denoiser.
+
+    variant: a report's table of one method; name: in `VARIANTS`
+    Raises ValueError where the table's markers are missing.
+    """
+    runs = variant.dropna(subset="seeds").assign(method=name)  # not the references' noise
+    table = learner_table(
+        pd.concat([results, runs]), METRICS, ["ours", name, "path_tracing_oidn_8spp"]
+    )
+    begin = f"<!-- {name}: written by analysis.learner_table -->"
+    return between_markers(page, table, begin=begin, end=f"<!-- end of {name} -->")
+
+
 def with_frames(page: str, benchmark: Mapping[str, Any]) -> str:
     """The page with its table of frames. Raises ValueError where its markers are missing."""
     begin, end = OF_FRAMES
@@ -111,6 +133,8 @@ def main() -> int:
     page = Path("docs/learner/README.md")
     text = with_parts(page.read_text(), pd.read_csv(ABLATION))
     text = with_minute(text, pd.read_csv(MINUTE))
+    for name, (file, _) in VARIANTS.items():
+        text = with_variant(text, results, pd.read_csv(file), name)
     page.write_text(with_frames(text, json.loads(FRAMES.read_text())))
     return 0
 

@@ -16,10 +16,12 @@ from analysis.learner_table import (
     OF_MINUTE,
     PAGES,
     RESULTS,
+    VARIANTS,
     learner_table,
     with_frames,
     with_minute,
     with_parts,
+    with_variant,
     written,
 )
 from analysis.parts_of_frames import frames_table
@@ -41,6 +43,32 @@ def test_the_page_has_the_numbers_of_the_ablation() -> None:
     assert text == with_parts(text, pd.read_csv(ROOT / ABLATION)), (
         "python -m analysis.learner_table writes it"
     )
+
+
+@pytest.mark.parametrize("name", VARIANTS)
+def test_the_page_has_the_numbers_of_what_ours_was_varied_in(name: str) -> None:
+    text = (ROOT / "docs/learner/README.md").read_text()
+    results, variant = pd.read_csv(ROOT / RESULTS), pd.read_csv(ROOT / VARIANTS[name][0])
+    assert text == with_variant(text, results, variant, name), (
+        "python -m analysis.learner_table writes it"
+    )
+
+
+def test_a_variant_stands_beside_ours() -> None:
+    errors = {f"hard_{metric}": 0.1 for metric in METRICS}
+    box = {"scene": "box", "seeds": "0 1", **errors}
+    results = pd.DataFrame([{**box, "method": m} for m in ("ours", "path_tracing_oidn_8spp")])
+    variant = pd.DataFrame(
+        [
+            {**box, "method": "whatever", "hard_mape": 0.05},
+            {**box, "method": "reference noise", "seeds": None, "hard_mape": 0.01},
+        ]
+    )
+    begin, end = "<!-- rays: written by analysis.learner_table -->", "<!-- end of rays -->"
+    table = with_variant(f"{begin}\n{end}", results, variant, "rays").splitlines()
+    assert "| ours | ours, 8 rays per pixel | Open Image Denoise, 8" in table[2]
+    same = "0.100 / **0.100** / **0.100** / **0.100**"
+    assert table[4] == f"| box | 2 | {same} | **0.050**{same.removeprefix('0.100')} | {same} |"
 
 
 def test_the_page_has_the_times_of_the_benchmark() -> None:

@@ -25,7 +25,7 @@ FEATURES, LAYERS = 128, 6
 SAMPLES_PER_PIXEL = 8
 """Of the paths that are denoised."""
 FEWER_RAYS = 8
-"""Per pixel, of buffers that take half the rays (`renderer.buffer_samples=8`)."""
+"""Per pixel, of buffers that take half the rays (`+renderer.buffer_samples=8`)."""
 
 
 def frames(scene: Scene, *, repeats: int, seconds: float) -> list[Figure]:
