@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import partial
-from itertools import count
+from itertools import cycle
 
 import torch
 from torch import Tensor, nn
@@ -75,21 +76,25 @@ def _frames(
         samples_per_pixel=SAMPLES_PER_PIXEL,
         seed=0,
     )
-    hard, numbers = renderer.hard_frames(), count()
+    hard = renderer.hard_frames()
     buffers = renderer.image_buffers(hard[0], resolution=resolution).cpu()
     noisy = tracing.trace(hard[0], resolution=resolution)
     bits = precision()
 
-    def next_v() -> Tensor:
-        return hard[next(numbers) % len(hard)]
+    def every_v(start: float) -> Iterator[Tensor]:
+        """All of them in turn, for one function; others start elsewhere, so that v changes."""
+        return cycle(hard.roll(-int(start * len(hard)), dims=0))
 
+    for_buffers, for_fewer_rays, for_network, for_paths = map(every_v, (0, 0.5, 0.25, 0.75))
     of_buffers, of_fewer_rays, of_network, of_paths, of_denoiser = in_turn(
         repeats,
         f"frames, {resolution} pixels",
-        lambda: renderer.image_buffers(next_v(), resolution=resolution),
-        lambda: renderer.image_buffers(next_v(), resolution=resolution, samples=FEWER_RAYS),
-        lambda: show(network, buffers, next_v(), bits),
-        lambda: tracing.trace(next_v(), resolution=resolution),
+        lambda: renderer.image_buffers(next(for_buffers), resolution=resolution),
+        lambda: renderer.image_buffers(
+            next(for_fewer_rays), resolution=resolution, samples=FEWER_RAYS
+        ),
+        lambda: show(network, buffers, next(for_network), bits),
+        lambda: tracing.trace(next(for_paths), resolution=resolution),
         partial(tracing.denoise, noisy, buffers),
         seconds=seconds,
     )

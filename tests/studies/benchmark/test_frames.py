@@ -1,6 +1,9 @@
+from itertools import pairwise
+
 import pytest
 
 from ngi.machine.backend import llvm_problem
+from ngi.methods.path_tracing.tracing import PathTracing
 from ngi.render.mitsuba_renderer import MitsubaRenderer
 from ngi.studies.benchmark import frames, viewer
 from ngi.studies.benchmark.scenes import shipped
@@ -10,15 +13,7 @@ from ngi.studies.benchmark.scenes import shipped
 
 @pytest.mark.skipif(llvm_problem() is not None, reason=str(llvm_problem()))
 def test_frames_take_as_long_as_their_parts(monkeypatch: pytest.MonkeyPatch) -> None:
-    traced = []
-
-    class Counted(MitsubaRenderer):
-        def image_buffers(self, v, *, resolution, samples=None):
-            traced.append((resolution, samples))
-            return super().image_buffers(v, resolution=resolution, samples=samples)
-
     monkeypatch.setattr(frames, "RESOLUTIONS", (24, 32))
-    monkeypatch.setattr(frames, "MitsubaRenderer", Counted)
     figures = frames.frames(MIRROR, repeats=1, seconds=60)
     assert len(figures) == 2 * 9
     for resolution, of_one in ((24, figures[:9]), (32, figures[9:])):
@@ -31,7 +26,34 @@ def test_frames_take_as_long_as_their_parts(monkeypatch: pytest.MonkeyPatch) -> 
         assert denoised == pytest.approx(paths + denoiser)
         assert share == pytest.approx(ours / denoised)
         assert share_of_fewer == pytest.approx((fewer + network) / denoised)
-        assert {rays for size, rays in traced if size == resolution} == {None, 8}
+
+
+@pytest.mark.skipif(llvm_problem() is not None, reason=str(llvm_problem()))
+def test_every_part_is_timed_on_every_hard_frame(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And on another one than the call before, so that nothing is kept from it."""
+    calls = []
+
+    class Counted(MitsubaRenderer):
+        def image_buffers(self, v, *, resolution, samples=None):
+            calls.append((samples, tuple(v.tolist())))
+            return super().image_buffers(v, resolution=resolution, samples=samples)
+
+    class Traced(PathTracing):
+        def trace(self, v, *, resolution):
+            calls.append(("paths", tuple(v.tolist())))
+            return super().trace(v, resolution=resolution)
+
+    monkeypatch.setattr(frames, "RESOLUTIONS", (24,))
+    monkeypatch.setattr(frames, "MitsubaRenderer", Counted)
+    monkeypatch.setattr(frames, "PathTracing", Traced)
+    hard = {tuple(v.tolist()) for v in Counted(scene=MIRROR.read()).hard_frames()}
+    frames.frames(MIRROR, repeats=len(hard) - 1, seconds=60)
+    _, _, *calls = calls  # the network's buffers and the denoiser's image; one round warms up
+    parts = [None, frames.FEWER_RAYS, "paths"]
+    assert [part for part, _ in calls] == parts * len(hard)
+    for part in parts:
+        assert {v for of, v in calls if of == part} == hard
+    assert all(before[1] != after[1] for before, after in pairwise(calls))
 
 
 @pytest.mark.skipif(llvm_problem() is not None, reason=str(llvm_problem()))
