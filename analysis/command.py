@@ -13,7 +13,7 @@ P = ParamSpec("P")
 def errors_in_a_line(main: Callable[P, int]) -> Callable[P, int]:
     """The entry point, which ends with status 1 and a line where it raises OSError or ValueError.
 
-    Output that nobody reads any more is left to `ngi.config.unread_output`.
+    BrokenPipeError is passed on: that nobody reads the output is not an error of what was given.
     """
 
     @functools.wraps(main)

@@ -45,7 +45,7 @@ VARIANTS = {
     "longer": (Path("docs/learner/longer.csv"), "ours, 300 s"),
     "rays": (Path("docs/learner/rays.csv"), "ours, 8 rays per pixel"),
 }
-"""What ours of other results is called, and its column, beside `METHODS`."""
+"""What ours of other results is called here: its file and its column, beside `METHODS`."""
 
 PAGES = {
     Path("README.md"): (("mape", "dssim"), list(METHODS)[:3]),
@@ -108,9 +108,17 @@ def with_variant(page: str, results: pd.DataFrame, variant: pd.DataFrame, name: 
     """The page with a table of ours, of a variant of it, and of the denoiser.
 
     variant: a report's table of one method; name: in `VARIANTS`
-    Raises ValueError where the table's markers are missing.
+    Raises ValueError where the table's markers are missing, and where the variant has another
+    scene or other seeds than ours.
     """
     runs = variant.dropna(subset="seeds").assign(method=name)  # not the references' noise
+    seeds = results[results["method"] == "ours"].set_index("scene")["seeds"]
+    for scene, of_variant in zip(runs["scene"], runs["seeds"], strict=True):
+        if seeds.get(scene) != of_variant:
+            raise ValueError(
+                f"{VARIANTS[name][0]}: '{scene}' has seeds {of_variant}, in {RESULTS} "
+                f"{seeds.get(scene)}"
+            )
     table = learner_table(
         pd.concat([results, runs]), METRICS, ["ours", name, "path_tracing_oidn_8spp"]
     )

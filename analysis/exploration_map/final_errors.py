@@ -12,14 +12,11 @@ import pandas as pd
 
 from analysis.command import errors_in_a_line
 from analysis.exploration_map.heat_maps import cell_text
-from analysis.exploration_map.runs import BASE, SAMPLERS, SETTING, UNIFORM, read_table
+from analysis.exploration_map.runs import BASE, OWN, SAMPLERS, SETTING, UNIFORM, read_table
 from analysis.exploration_map.speedup import Comparison
 from analysis.exploration_map.tables import knobs_of, setting_name
 from analysis.statistics import estimate, paired_difference
 from analysis.tables import Cell, Table, format_estimate, format_percent, to_markdown
-
-OWN = "uniform_here"
-"""Uniform sampling of a folder whose runs are compared with another one's."""
 
 NAMES = {
     UNIFORM: "uniform",
@@ -46,8 +43,8 @@ def final_errors(table: pd.DataFrame) -> Table:
     """A row per setting, length, kind of reuse and sampler: means over seeds with their interval.
 
     Differences to uniform sampling are relative and paired by seed. Ratios of run times are those
-    of `analysis.exploration_map.speedup` at the base's costs; there is none where finding the rare
-    costs nothing.
+    of `analysis.exploration_map.speedup` at the base's costs; there is none for samplers that know
+    where the rare is.
     """
     shown = {name: title for name, title in COLUMNS.items() if name in table}
     rows = []
@@ -77,16 +74,22 @@ def final_errors(table: pd.DataFrame) -> Table:
 def against(table: pd.DataFrame, other: pd.DataFrame) -> pd.DataFrame:
     """The table with another one's uniform sampling to compare with, and its own beside it.
 
-    Raises ValueError where the other one lacks a setting, a kind of reuse or a seed.
+    Raises ValueError where the other one lacks a setting, a kind of reuse or a seed, and where its
+    runs are not as long.
     """
+    lengths = [int(of["step"].max()) for of in (table, other)]
+    if lengths[0] != lengths[1]:
+        raise ValueError(f"runs of {lengths[0]} steps cannot be compared with runs of {lengths[1]}")
     keys = [*SETTING, "reuse", "seed"]
     wanted = table[keys].drop_duplicates()
     uniform = other[other["sampler"] == UNIFORM].merge(wanted, on=keys)
-    missing = wanted.merge(uniform[keys].drop_duplicates(), on=keys, how="left", indicator=True)
-    if (lacking := missing[missing["_merge"] == "left_only"]).size:
-        knobs = knobs_of(lacking[SETTING].iloc[0].tolist())
-        seed = lacking["seed"].iloc[0]
-        raise ValueError(f"no uniform sampling to compare with: {setting_name(knobs)}, seed {seed}")
+    known = {*uniform[keys].itertuples(index=False, name=None)}
+    for *knobs, reuse, seed in wanted.itertuples(index=False, name=None):
+        if (*knobs, reuse, seed) not in known:
+            raise ValueError(
+                f"no uniform sampling to compare with: {setting_name(knobs_of(knobs))}, "
+                f"{'with' if reuse else 'without'} reuse, seed {seed}"
+            )
     return pd.concat([uniform, table.replace({"sampler": {UNIFORM: OWN}})], ignore_index=True)
 
 
@@ -101,7 +104,7 @@ def _difference(runs: pd.DataFrame, sampler: str, error: str) -> str:
 
 
 def _time(rows: pd.DataFrame, sampler: str, error: str) -> str:
-    if sampler not in SAMPLERS:
+    if sampler not in (OWN, *SAMPLERS):
         return ""
     reuse = bool(rows["reuse"].iloc[0])
     found = Comparison(rows, sampler, reuse, BASE["cost_ratio"], error).speedup()

@@ -41,6 +41,8 @@ SETTING = [knob for knob in KNOBS if knob != "cost_ratio"]
 """The knobs that are columns of the table."""
 
 UNIFORM = "uniform"
+OWN = "uniform_here"
+"""Uniform sampling of a table whose runs are compared with another one's."""
 
 SAMPLERS = {
     **{
@@ -89,8 +91,8 @@ def read_table(folder: Path) -> pd.DataFrame:
 
 
 def scoring_cost(sampler: str) -> float:
-    """Of one batch, in training steps; nothing for the uniform sampler."""
-    if sampler == UNIFORM:
+    """Of one batch, in training steps; nothing for uniform sampling."""
+    if sampler in (UNIFORM, OWN):
         return 0.0
     return SCORING[sampler if sampler in SCORING else sampler.rsplit("_", 1)[0]]
 

@@ -278,7 +278,12 @@ def test_final_errors_can_be_compared_with_another_folders_uniform_sampling(
     assert [cells[4] for cells in shown] == ["uniform", "uniform, reuse as here", "predicted loss"]
     for cells, rate in zip(shown[1:], (0.002, 0.003), strict=True):
         assert cells[-5] == f"{100 * math.expm1(1000 * (0.001 - rate)):.1f} ± 0.0 %"
-    fewer = pd.read_csv(tmp_path / "steady" / "exploration_map.csv").query("seed == 0")
-    fewer.to_csv(tmp_path / "steady" / "exploration_map.csv", index=False)
-    assert final_errors_main([*words, str(tmp_path / "steady")]) == 1
-    assert "no uniform sampling to compare with: base, seed 1" in capsys.readouterr().err
+        assert float(cells[-3]) == pytest.approx(rate / 0.001, abs=0.06)
+    whole = pd.read_csv(tmp_path / "steady" / "exploration_map.csv")
+    for part, problem in (
+        ("seed == 0", "no uniform sampling to compare with: base, with reuse, seed 1"),
+        ("step < 900", "runs of 1000 steps cannot be compared with runs of 890"),
+    ):
+        whole.query(part).to_csv(tmp_path / "steady" / "exploration_map.csv", index=False)
+        assert final_errors_main([*words, str(tmp_path / "steady")]) == 1
+        assert problem in capsys.readouterr().err

@@ -69,6 +69,9 @@ def test_a_variant_stands_beside_ours() -> None:
     assert "| ours | ours, 8 rays per pixel | Open Image Denoise, 8" in table[2]
     same = "0.100 / **0.100** / **0.100** / **0.100**"
     assert table[4] == f"| box | 2 | {same} | **0.050**{same.removeprefix('0.100')} | {same} |"
+    for changed in ({"seeds": "0"}, {"scene": "hall"}):
+        with pytest.raises(ValueError, match=r"rays.csv: '(box|hall)' has seeds"):
+            with_variant(f"{begin}\n{end}", results, variant.assign(**changed), "rays")
 
 
 def test_the_page_has_the_times_of_the_benchmark() -> None:

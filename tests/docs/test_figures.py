@@ -89,6 +89,18 @@ def test_a_frame_of_ours_takes_the_share_of_the_denoisers_time_that_is_said() ->
     assert again == range_of("ours with 8 rays / paths and")
 
 
+@pytest.mark.parametrize("page", ["README.md", "docs/learner/README.md"])
+def test_with_half_the_rays_ours_is_better_on_as_many_scenes_as_is_said(page: str) -> None:
+    metrics = [f"hard_{metric}" for metric in METRICS]
+    tables = (pd.read_csv(ROOT / f"docs/learner/{name}.csv") for name in ("rays", "results"))
+    ours, all_methods = (table.dropna(subset="seeds").set_index("scene") for table in tables)
+    denoised = all_methods[all_methods["method"] == "path_tracing_oidn_8spp"]
+    better = (ours[metrics] < denoised.loc[ours.index, metrics]).all(axis=1)
+    assert len(better) == 6
+    (number,) = said(page, r"in all four metrics on (\w+) of the six(?: scenes\*\*|\.)")
+    assert number == {3: "three", 4: "four", 5: "five"}[better.sum()]
+
+
 def range_of(name: str) -> tuple[str, str]:
     """Smallest and largest median of the frames' figures that are called so."""
     figures = json.loads((ROOT / "docs/learner/frames.json").read_text())["figures"]

@@ -22,7 +22,7 @@ SELF_TUNING = ("reuse=self_tuning", "reuse.policy.bootstrap_batches=20", "reuse.
 STEADY = ("reuse=steady",)
 """That of `method=ours`, whoever chooses the samples."""
 BY_LOSS = ("reuse=steady_by_loss",)
-"""The same, with a tenth of the stored patches drawn in proportion to their losses."""
+"""The same, stored patches drawn with replacement, a tenth in proportion to their losses."""
 NO_REUSE = ("reuse=never",)
 
 

@@ -100,6 +100,19 @@ def test_the_long_plan_reuses_as_ours_does_and_knows_the_noise() -> None:
     assert last["generated_batches"] < 12
 
 
+def test_by_loss_differs_from_the_long_plan_in_what_stored_patches_are_drawn() -> None:
+    by_loss, long = PLANS["ours_by_loss"], PLANS["ours_long"]
+    assert set(by_loss.methods) == {method for method in long.methods if method.reuse}
+    for method in by_loss.methods:
+        made, other = (training.plain_configuration(method, plan) for plan in (by_loss, long))
+        rule = made["reuse"]["store"].pop("rule")
+        assert rule["_target_"] == "ngi.reuse.ByImportance"
+        assert rule["importance"].items() >= {"uniform_share": 0.9, "largest_ratio": 8.0}.items()
+        assert other["reuse"]["store"].pop("rule")["_target_"] == "ngi.reuse.Epochs"
+        assert made == other
+    assert replace(by_loss, methods=long.methods, reuse=long.reuse) == long
+
+
 def test_predictions_are_counted_as_scores_are() -> None:
     """One per new batch, also where chains would have nothing to be compared with yet."""
     method = Method("predicted", reuse=False)
