@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import partial
 from itertools import cycle
 
@@ -62,6 +63,17 @@ def precision() -> torch.dtype:
     return torch.bfloat16 if fast_precision() == "bf16-mixed" else torch.float32
 
 
+@dataclass(frozen=True)
+class _Times:
+    """Seconds of each part of the frames, in the order of the rounds."""
+
+    buffers: list[float]
+    fewer_rays: list[float]
+    network: list[float]
+    paths: list[float]
+    denoiser: list[float]
+
+
 def _frames(
     renderer: MitsubaRenderer,
     network: nn.Module,
@@ -86,7 +98,7 @@ def _frames(
         return cycle(hard.roll(-int(start * len(hard)), dims=0))
 
     for_buffers, for_fewer_rays, for_network, for_paths = map(every_v, (0, 0.5, 0.25, 0.75))
-    of_buffers, of_fewer_rays, of_network, of_paths, of_denoiser = in_turn(
+    times = in_turn(
         repeats,
         f"frames, {resolution} pixels",
         lambda: renderer.image_buffers(next(for_buffers), resolution=resolution),
@@ -98,28 +110,34 @@ def _frames(
         partial(tracing.denoise, noisy, buffers),
         seconds=seconds,
     )
-    ours = _sums(of_buffers, of_network)
-    with_fewer = _sums(of_fewer_rays, of_network)
-    denoised = _sums(of_paths, of_denoiser)
-    size = f"{resolution} × {resolution}"
+    return _figures(_Times(*times), f"{resolution} × {resolution}")
+
+
+def _figures(times: _Times, size: str) -> list[Figure]:
+    """Of the parts in milliseconds, and the shares of the denoiser's time. size: in their names."""
+    ours = _sums(times.buffers, times.network)
+    denoised = _sums(times.paths, times.denoiser)
     parts = {
-        "buffers with direct light": of_buffers,
-        f"the same, {FEWER_RAYS} rays per pixel": of_fewer_rays,
-        f"network {LAYERS}x{FEATURES}": of_network,
+        "buffers with direct light": times.buffers,
+        f"the same, {FEWER_RAYS} rays per pixel": times.fewer_rays,
+        f"network {LAYERS}x{FEATURES}": times.network,
         "ours": ours,
-        f"paths, {SAMPLES_PER_PIXEL} samples per pixel": of_paths,
-        "denoiser": of_denoiser,
+        f"paths, {SAMPLES_PER_PIXEL} samples per pixel": times.paths,
+        "denoiser": times.denoiser,
         "paths and denoiser": denoised,
     }
-    shares = {"ours": ours, f"ours with {FEWER_RAYS} rays": with_fewer}
+    shares = {
+        "ours": ours,
+        f"ours with {FEWER_RAYS} rays": _sums(times.fewer_rays, times.network),
+    }
     return [
         *(
-            figure(f"{part}, {size}", [1e3 * t for t in times], "ms")
-            for part, times in parts.items()
+            figure(f"{part}, {size}", [1e3 * second for second in seconds], "ms")
+            for part, seconds in parts.items()
         ),
         *(
-            figure(f"{name} / paths and denoiser, {size}", ratio(times, denoised), "×", "≤ 0.5")
-            for name, times in shares.items()
+            figure(f"{name} / paths and denoiser, {size}", ratio(seconds, denoised), "×", "≤ 0.5")
+            for name, seconds in shares.items()
         ),
     ]
 
