@@ -4,6 +4,7 @@ import hashlib
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass
+from random import SystemRandom
 from time import perf_counter
 from typing import TypeVar
 
@@ -73,32 +74,42 @@ class Evaluator:
             return
         digest = hashlib.sha256()
         prepared = []
-        with tqdm(self._frames, desc="references", unit="frame") as progress:
-            for frame in progress:
-                v = frame.scene_vector
-                reference = self._cache.get(
+        for frame, reference in zip(self._frames, self._references(), strict=True):
+            seconds: dict[str, float] = {}
+            digest.update(f"{frame.set}/{frame.index}/{reference.content_hash}\n".encode())
+            prepared.append(
+                _PreparedFrame(
+                    frame=frame,
+                    buffers=timed(seconds, "buffers", self._buffers, frame.scene_vector),
+                    inputs=timed(seconds, "inputs", self._inputs, frame.scene_vector),
+                    seconds=seconds,
+                    reference=reference,
+                    floor=self._measure(frame, reference.half_a, reference.radiance),
+                )
+            )
+        self._reference_hash = digest.hexdigest()[:16]
+        self._prepared = tuple(prepared)
+        self._report_noise()
+
+    def _references(self) -> list[Reference]:
+        """Of all frames, in their order; got in an order that is another in every process.
+
+        Runs that begin side by side thus render them together, and not each of them all.
+        """
+        order = list(range(len(self._frames)))
+        SystemRandom().shuffle(order)
+        found = {}
+        with tqdm(order, desc="references", unit="frame") as progress:
+            for index in progress:
+                found[index] = self._cache.get(
                     self._renderer,
                     self.protocol,
-                    v,
+                    self._frames[index].scene_vector,
                     on_pass=lambda samples, noise: progress.set_postfix_str(
                         f"{samples} spp, noise {noise:.1%}"
                     ),
                 )
-                seconds: dict[str, float] = {}
-                digest.update(f"{frame.set}/{frame.index}/{reference.content_hash}\n".encode())
-                prepared.append(
-                    _PreparedFrame(
-                        frame=frame,
-                        buffers=timed(seconds, "buffers", self._buffers, v),
-                        inputs=timed(seconds, "inputs", self._inputs, v),
-                        seconds=seconds,
-                        reference=reference,
-                        floor=self._measure(frame, reference.half_a, reference.radiance),
-                    )
-                )
-        self._reference_hash = digest.hexdigest()[:16]
-        self._prepared = tuple(prepared)
-        self._report_noise()
+        return [found[index] for index in range(len(order))]
 
     def _report_noise(self) -> None:
         """One line where references stayed above the protocol's noise level."""

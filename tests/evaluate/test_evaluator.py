@@ -2,13 +2,14 @@ import csv
 import dataclasses
 import json
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 import torch
 from PIL import Image
 
-from ngi.evaluate import METRICS, SETS, Evaluator, ReferenceCache, error_picture, mape
+from ngi.evaluate import METRICS, SETS, Evaluator, Reference, ReferenceCache, error_picture, mape
 from ngi.evaluate.evaluation import worst_mean
 
 
@@ -92,6 +93,33 @@ def test_gradients_are_off_and_references_rendered_once(evaluator, renderer) -> 
     renderer.seeds.clear()
     assert evaluator.evaluate(perfect).reference_hash == first.reference_hash
     assert not renderer.seeds
+
+
+def test_evaluators_that_begin_together_share_the_references(renderer, protocol, tmp_path) -> None:
+    asked: list[list[tuple[float, ...]]] = []
+
+    class Recording(ReferenceCache):
+        def get(self, renderer: Any, protocol: Any, v: torch.Tensor, **more: Any) -> Reference:
+            asked[-1].append(tuple(v.tolist()))
+            return super().get(renderer, protocol, v, **more)
+
+    for _ in range(2):
+        asked.append([])
+        evaluator = Evaluator(
+            renderer=renderer,
+            test_inputs=v_alone,
+            protocol=protocol,
+            cache=Recording(tmp_path / "references"),
+            lpips=MeanDistance(),
+        )
+        frames = evaluator.evaluate(perfect).frames
+        assert [
+            f.frame.scene_vector.tolist() for f in frames[:10]
+        ] == renderer.hard_frames().tolist()
+    first, second = asked
+    assert len(set(first)) == 14
+    assert sorted(first) == sorted(second)
+    assert first != second  # by chance once in 14! times
 
 
 def test_buffers_come_from_the_present_renderer(evaluator, renderer, protocol, tmp_path) -> None:
