@@ -1,6 +1,7 @@
-"""The table of claims in docs/results.md, from the tables that the report has written.
+"""The tables of claims in docs/results.md, from the tables that a report has written.
 
-`python -m analysis.readme_table RESULTS.md PAGE.md` writes it between two markers of the page.
+`python -m analysis.readme_table RESULTS.md PAGE.md` writes those that the report has runs of, with
+the paper's learner, with ours, or both, between their markers of the page.
 """
 
 from __future__ import annotations
@@ -14,7 +15,9 @@ from analysis.claims import CLAIMS
 from analysis.command import errors_in_a_line
 from analysis.evidence import Verdict
 
-BEGIN, END = "<!-- claims: written by analysis.readme_table -->", "<!-- end of claims -->"
+BEGIN = "<!-- claims: written by analysis.readme_table -->"
+BEGIN_WITH_OURS = "<!-- claims with ours: written by analysis.readme_table -->"
+END = "<!-- end of claims -->"
 
 HEADING = "**Claims of the paper**"
 
@@ -32,20 +35,25 @@ def claim_lines(results: str) -> list[dict[str, str]]:
     return [dict(zip(rows[0], row, strict=True)) for row in rows[2:]]
 
 
-def readme_table(results: str) -> str:
-    """A row per claim that has runs: the first line of its evidence, and the verdict on all."""
-    titles = {claim.id: claim.title for claim in CLAIMS}
-    rows = [
-        "| claim of the paper | primary test | difference (95 %) | verdict |",
-        "|:--|:--|--:|:--|",
-    ]
+def readme_table(results: str, *, with_ours: bool = False) -> str:
+    """A row per claim that has runs: the first line of its evidence, and the verdict on all.
+
+    with_ours: of the claims judged with our learner, not of those judged with the paper's. Without
+    such runs the text is empty.
+    """
+    titles = {claim.id: claim.title for claim in CLAIMS if claim.with_ours == with_ours}
+    rows = []
     for line in claim_lines(results):
-        if not (verdict := line["of the claim"]):
+        if line["claim"] not in titles or not (verdict := line["of the claim"]):
             continue
         shown = verdict if verdict == Verdict.INCONCLUSIVE else f"**{verdict}**"
         cells = (titles[line["claim"]], line["compared"], line["difference"], shown)
         rows.append(markdown_row(cells))
-    return "\n".join(rows)
+    heading = [
+        "| claim of the paper | primary test | difference (95 %) | verdict |",
+        "|:--|:--|--:|:--|",
+    ]
+    return "\n".join(heading + rows) if rows else ""
 
 
 def markdown_row(cells: Iterable[str]) -> str:
@@ -53,9 +61,15 @@ def markdown_row(cells: Iterable[str]) -> str:
     return f"| {' | '.join(cells)} |"
 
 
-def with_table(page: str, table: str) -> str:
-    """The page with this table. Raises ValueError where the markers are missing."""
-    return between_markers(page, table, begin=BEGIN, end=END)
+def with_tables(page: str, results: str) -> str:
+    """The page with the tables that `results` has runs of; the others stay as they are.
+
+    Raises ValueError where markers are missing.
+    """
+    for begin, with_ours in ((BEGIN, False), (BEGIN_WITH_OURS, True)):
+        if table := readme_table(results, with_ours=with_ours):
+            page = between_markers(page, table, begin=begin, end=END)
+    return page
 
 
 def between_markers(page: str, table: str, *, begin: str, end: str) -> str:
@@ -74,7 +88,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(__doc__, file=sys.stderr)
         return 2
     results, readme = map(Path, arguments)
-    readme.write_text(with_table(readme.read_text(), readme_table(results.read_text())))
+    readme.write_text(with_tables(readme.read_text(), results.read_text()))
     return 0
 
 

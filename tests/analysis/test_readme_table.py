@@ -9,7 +9,15 @@ import pytest
 from analysis.claim_tables import claims_table
 from analysis.evidence import Verdict, of_tests
 from analysis.methods import name_methods
-from analysis.readme_table import BEGIN, END, claim_lines, main, readme_table, with_table
+from analysis.readme_table import (
+    BEGIN,
+    BEGIN_WITH_OURS,
+    END,
+    claim_lines,
+    main,
+    readme_table,
+    with_tables,
+)
 from analysis.runs import find_runs
 from analysis.tables import to_markdown
 from analysis.verdicts import judge
@@ -17,16 +25,20 @@ from analysis.verdicts import judge
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def test_the_page_of_results_has_the_numbers_and_verdicts_of_docs_small() -> None:
+REPORTS = ["docs/small/results.md", "docs/small/ours/results.md"]
+
+
+@pytest.mark.parametrize("report", REPORTS)
+def test_the_page_of_results_has_the_numbers_and_verdicts_of(report: str) -> None:
     page = (ROOT / "docs" / "results.md").read_text()
-    results = (ROOT / "docs" / "small" / "results.md").read_text()
-    assert page == with_table(page, readme_table(results)), (
-        "python -m analysis.readme_table docs/small/results.md docs/results.md writes it"
+    assert page == with_tables(page, (ROOT / report).read_text()), (
+        f"python -m analysis.readme_table {report} docs/results.md writes it"
     )
 
 
-def test_the_verdicts_of_docs_small_follow_from_its_tests() -> None:
-    lines = claim_lines((ROOT / "docs" / "small" / "results.md").read_text())
+@pytest.mark.parametrize("report", REPORTS)
+def test_verdicts_follow_from_the_tests_of(report: str) -> None:
+    lines = claim_lines((ROOT / report).read_text())
     for claim, grouped in groupby(lines, lambda line: line["claim"]):
         primary, *further = list(grouped)
         verdict = of_tests(Verdict(primary["verdict"]), [Verdict(f["verdict"]) for f in further])
@@ -52,12 +64,25 @@ def test_verdicts_are_those_of_the_judge(make_method, tmp_path) -> None:
     assert all(re.match(r"[+-]?\d|–", row[2]) for row in rows)
 
 
+def test_claims_judged_with_ours_have_a_table_of_their_own(make_method, tmp_path) -> None:
+    for seed in range(3):
+        make_method("ours_exploring", scene="living-room", seed=seed, error=0.05)
+        make_method("ours_uniform", scene="living-room", seed=seed)
+    claims = judge(name_methods(find_runs(tmp_path)[0]))
+    results = f"intro\n\n{to_markdown(claims_table(claims))}\n\n**next**"
+    papers, ours = f"{BEGIN}\n\nold\n\n{END}", f"{BEGIN_WITH_OURS}\n\nold\n\n{END}"
+    page = with_tables(f"{papers}\n{ours}", results)
+    assert readme_table(results) == ""
+    assert page.startswith(papers)
+    assert "old" not in page.removeprefix(papers)
+    assert "with our learner" in page.removeprefix(papers)
+
+
 def test_what_is_missing_is_said(tmp_path, capsys) -> None:
     with pytest.raises(ValueError, match="no table"):
         readme_table("nothing")
     with pytest.raises(ValueError, match="put the lines"):
-        with_table("nothing", "")
-    assert with_table(f"a {BEGIN} old {END} b", "t") == f"a {BEGIN}\n\nt\n\n{END} b"
+        with_tables("nothing", (ROOT / "docs/small/results.md").read_text())
     assert main([str(tmp_path / "none"), str(ROOT / "docs" / "results.md")]) == 1
     assert "none" in capsys.readouterr().err
     assert main([]) == 2
