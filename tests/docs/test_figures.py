@@ -52,7 +52,8 @@ def test_the_readme_gives_every_claim_the_verdict_of_the_report() -> None:
 def test_the_readme_says_of_ours_exploring_what_its_report_says() -> None:
     lines = claim_lines((ROOT / "docs/small/ours/results.md").read_text())
     verdicts = {line["claim"]: line["of the claim"] for line in lines if line["of the claim"]}
-    shown = said("README.md", r"has (\d\.\d) % more error .*? same time \((\d\.\d) to (\d\.\d)\): not")
+    pattern = r"has (\d\.\d) % more error .*? same time \((\d\.\d) to (\d\.\d)\): not"
+    shown = said("README.md", pattern)
     measured = [line["difference"] for line in lines if line["claim"] == "ours_same_time"]
     assert measured == ["+{} % [+{}, +{}]".format(*shown)]
     refuted, open_ = said("README.md", r"either, (nor is .+?); (.+?) stay inconclusive")
