@@ -83,8 +83,8 @@ def _draw(axes: Axes, runs: Sequence[Run], key: str, claim: str) -> None:
 def _difference(better: Run, worse: Run, key: str) -> Run:
     """The better run with the worse one's error minus its own as its history.
 
-    The errors are taken at the better run's evaluations, the worse one's interpolated linearly;
-    the evaluations outside the worse run's time are left out.
+    It has the better run's evaluations, as far as both runs' times reach and at the ends of that;
+    errors between evaluations are interpolated linearly.
     """
     ours, theirs = (
         run.history[["run_seconds", key]].dropna().to_numpy(dtype=float)
@@ -94,6 +94,7 @@ def _difference(better: Run, worse: Run, key: str) -> Run:
     )
     if not len(ours) or not len(theirs):
         return replace(better, history=pd.DataFrame({"run_seconds": [], key: []}))
-    ours = ours[(ours[:, 0] >= theirs[0, 0]) & (ours[:, 0] <= theirs[-1, 0])]
-    difference = np.interp(ours[:, 0], theirs[:, 0], theirs[:, 1]) - ours[:, 1]
-    return replace(better, history=pd.DataFrame({"run_seconds": ours[:, 0], key: difference}))
+    start, end = max(ours[0, 0], theirs[0, 0]), min(ours[-1, 0], theirs[-1, 0])
+    times = np.unique(ours[:, 0].clip(start, end)) if start <= end else np.empty(0)
+    difference = np.interp(times, *theirs.T) - np.interp(times, *ours.T)
+    return replace(better, history=pd.DataFrame({"run_seconds": times, key: difference}))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
+import pytest
 
 from analysis.dimensions_plot import dimensions_figure, write_dimensions_figures
 from analysis.runs import find_runs
@@ -36,3 +38,16 @@ def test_curves_are_the_uniform_error_less_that_of_exploration(make_method, tmp_
     np.testing.assert_allclose(
         curve.get_ydata(), errors["ours_uniform"] - errors["ours_exploring"], rtol=1e-6
     )
+
+
+@pytest.mark.parametrize("longer", ["ours_exploring", "ours_uniform"])
+def test_curves_reach_to_where_both_runs_end(make_method, tmp_path, longer) -> None:
+    for method in ("ours_exploring", "ours_uniform"):
+        file = make_method(method, scene="salon-7") / "metrics.csv"
+        history = pd.read_csv(file)
+        ends = history["run_seconds"].max()
+        if method == longer:  # by the batch that it ends with
+            history["run_seconds"] *= 1.02
+            history.to_csv(file, index=False)
+    figure = dimensions_figure(find_runs(tmp_path)[0], ["mae"], "ours_dimensions")
+    assert figure.axes[0].lines[0].get_xdata()[-1] == pytest.approx(ends)
