@@ -47,11 +47,9 @@ def error_curve(runs: Sequence[Run], key: str, *, signed: bool = False) -> Curve
         if not len(points):
             return None
         series.append(points[points[:, 0].argsort()])
-    start = max(points[0, 0] for points in series)
-    end = min(points[-1, 0] for points in series)
-    if start > end:
+    times = common_times(series)
+    if not len(times):
         return None
-    times = np.unique(series[0][:, 0].clip(start, end))
     values = np.stack([np.interp(times, points[:, 0], points[:, 1]) for points in series])
     mean = values.mean(axis=0)
     half_width = np.array([_half_width(column) for column in values.T])
@@ -59,6 +57,16 @@ def error_curve(runs: Sequence[Run], key: str, *, signed: bool = False) -> Curve
         return Curve(times, mean, mean - half_width, mean + half_width, len(runs))
     relative = np.divide(half_width, mean, out=np.zeros_like(mean), where=mean != 0)
     return Curve(times, mean, mean / np.exp(relative), mean * np.exp(relative), len(runs))
+
+
+def common_times(series: Sequence[np.ndarray]) -> np.ndarray:
+    """The times of the first, as far as all reach and at the ends of that; none where they do not.
+
+    series: [points, 2] each, a time and a value, by time
+    """
+    start = max(points[0, 0] for points in series)
+    end = min(points[-1, 0] for points in series)
+    return np.unique(series[0][:, 0].clip(start, end)) if start <= end else np.empty(0)
 
 
 def _half_width(values: np.ndarray) -> float:

@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from analysis.claims import CLAIMS, SALONS
-from analysis.curves import error_curve
+from analysis.curves import common_times, error_curve
 from analysis.pairs import pair_runs
 from analysis.plots import STYLE, add_legend, draw_band, new_figure, save_figure
 from analysis.runs import METRICS, Run
@@ -94,7 +94,6 @@ def _difference(better: Run, worse: Run, key: str) -> Run:
     )
     if not len(ours) or not len(theirs):
         return replace(better, history=pd.DataFrame({"run_seconds": [], key: []}))
-    start, end = max(ours[0, 0], theirs[0, 0]), min(ours[-1, 0], theirs[-1, 0])
-    times = np.unique(ours[:, 0].clip(start, end)) if start <= end else np.empty(0)
+    times = common_times([ours, theirs])
     difference = np.interp(times, *theirs.T) - np.interp(times, *ours.T)
     return replace(better, history=pd.DataFrame({"run_seconds": times, key: difference}))

@@ -13,6 +13,7 @@ from analysis.readme_table import (
     BEGIN,
     BEGIN_WITH_OURS,
     END,
+    between_markers,
     claim_lines,
     main,
     readme_table,
@@ -83,6 +84,8 @@ def test_what_is_missing_is_said(tmp_path, capsys) -> None:
         readme_table("nothing")
     with pytest.raises(ValueError, match="put the lines"):
         with_tables("nothing", (ROOT / "docs/small/results.md").read_text())
+    replaced = between_markers(f"a {BEGIN} old {END} b", "t", begin=BEGIN, end=END)
+    assert replaced == f"a {BEGIN}\n\nt\n\n{END} b"
     assert main([str(tmp_path / "none"), str(ROOT / "docs" / "results.md")]) == 1
     assert "none" in capsys.readouterr().err
     assert main([]) == 2
