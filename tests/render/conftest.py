@@ -10,6 +10,13 @@ from ngi.scene import read_scene
 BOX = Path(__file__).parent / "scenes" / "box"
 
 
+@pytest.fixture(params=["llvm", "scalar"])
+def backend(request) -> str:
+    if request.param == "llvm" and (problem := llvm_problem()) is not None:
+        pytest.skip(problem)
+    return request.param
+
+
 @pytest.fixture(scope="session")
 def box_folder() -> Path:
     return BOX

@@ -35,13 +35,6 @@ DIM = "{object: bulb, property: intensity, minimum: 1, maximum: 2}"
 PAINT = "{object: paint, property: albedo, minimum: [0, 0, 0], maximum: [1, 1, 1]}"
 
 
-@pytest.fixture(params=["llvm", "scalar"])
-def backend(request):
-    if request.param == "llvm" and (problem := llvm_problem()) is not None:
-        pytest.skip(problem)
-    return request.param
-
-
 @pytest.fixture
 def load(tmp_path):
     def load(shapes, *, backend, variables=(DIM,), max_depth=5, **arguments):

@@ -1,9 +1,11 @@
 """Scenes with mirrors and glass, and where NumPy says that their camera rays end."""
 
 import numpy as np
+import torch
 
 from tests.render.optics import (
     ORIGIN,
+    SIZE,
     dot,
     fresnel,
     on_plane,
@@ -22,6 +24,9 @@ GLASS = f'<bsdf type="dielectric" id="glass"><float name="int_ior" value="{INDEX
 SILVER = '<bsdf type="conductor" id="silver"><rgb name="eta" value="0.2, 0.9, 1.1"/>\
 <rgb name="k" value="3.9, 2.4, 2.2"/>\
 <rgb name="specular_reflectance" value="0.9, 0.8, 0.7"/></bsdf>'
+ROUGH = '<bsdf type="twosided" id="steel"><bsdf type="roughconductor">\
+<string name="material" value="none"/>{alpha}</bsdf></bsdf>'
+STEEL = "{object: steel, property: roughness, minimum: 0.01, maximum: 0.09}"
 PICTURE = '<emitter type="area"><texture type="bitmap" name="radiance">\
 <string name="filename" value="picture.png"/></texture></emitter>'
 PLAIN = '<emitter type="area"><rgb name="radiance" value="0.5"/></emitter>'
@@ -114,3 +119,11 @@ def mirror_and_slab():
     passed = (1 - fresnel(-dot(away, normal), INDEX)) ** 2
     _, _, _, met = mirror()
     return end, away, silver(d, MIRROR_NORMAL) * passed, met
+
+
+def buffers(renderer, v=None, resolution=RESOLUTION):
+    """Name -> [n, n, channels], positions in the scene's units: what the renderer says."""
+    v = torch.zeros(renderer.dimensions) if v is None else torch.tensor(v)
+    image = renderer.image_buffers(v, resolution=resolution).numpy()
+    named = {name: image[..., renderer.layout.slice(name)] for name in renderer.layout.names}
+    return named | {"position": (2 * named["position"] - 1) * SIZE}
