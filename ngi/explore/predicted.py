@@ -16,6 +16,9 @@ from ngi.explore.targets import Constant
 NEWER_SHARE = 1 / 8
 """Of the remembered states: when so many are newer than the forest, it is grown anew."""
 
+SEEN_TOGETHER = 64
+"""Losses that the network had as much training for, roughly."""
+
 
 @dataclass(frozen=True)
 class PredictedState(ChainState):
@@ -132,7 +135,8 @@ class PredictedLoss:
         newer = state.newer + known.sum()
         forest = state.forest
         if len(seen) >= 2 * self.chains and newer >= NEWER_SHARE * len(seen):
-            forest, newer = grow(seen, loss, generator, **self._forest), torch.tensor(0)
+            forest = grow(seen, _of_their_time(loss), generator, **self._forest)
+            newer = torch.tensor(0)
         moved = replace(
             state,
             position=proposals.position,
@@ -147,3 +151,15 @@ class PredictedLoss:
         )
         everywhere = torch.ones(self.chains, dtype=torch.bool)
         return moved, ChainInfo(everywhere, everywhere, ~state.occupied, moved.age)
+
+
+def _of_their_time(losses: Tensor) -> Tensor:
+    """Each divided by the mean of those that were seen shortly before and after it, [m].
+
+    A network loses less everywhere as it learns: without this the first states would look as if
+    they were the worst until they are forgotten, which takes most of a run that reuses patches.
+    """
+    count = min(SEEN_TOGETHER, len(losses))
+    first = (torch.arange(len(losses)) - count // 2).clamp(0, len(losses) - count)
+    mean = losses[first[:, None] + torch.arange(count)].mean(dim=1)
+    return torch.where(mean > 0, losses / mean, 0.0)
