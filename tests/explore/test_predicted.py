@@ -76,13 +76,20 @@ def test_states_are_uniform_as_long_as_hardly_any_loss_is_known() -> None:
     assert weights.tolist() == [1.0] * (200 * CHAINS)
 
 
-def explored(found: PredictedLoss, *, batches: int) -> tuple[torch.Tensor, torch.Tensor]:
-    """States proposed in the second half, and their weights; the loss is 1 in a rare box, or 0."""
+def explored(
+    found: PredictedLoss, *, batches: int, untrained: int = 0
+) -> tuple[torch.Tensor, torch.Tensor]:
+    """States proposed in the second half, and their weights; the loss is 1 in a rare box, or 0.
+
+    untrained: batches at the start in which it is about 10 everywhere
+    """
     state, generator = found.init(4), torch.Generator().manual_seed(4)
     late = []
     for batch in range(batches):
         proposals = found.propose(state, generator, batch=batch)
         losses = lit(proposals.position)
+        if batch < untrained:
+            losses = 5 + 10 * torch.rand(CHAINS, generator=generator)
         ids = torch.arange(CHAINS) + CHAINS * batch
         state, _ = found.accept(
             state, proposals, ids, None, torch.zeros(CHAINS), generator, losses=losses
@@ -104,6 +111,13 @@ def test_rare_losses_are_drawn_more_often_and_weigh_less() -> None:
     assert weights.max() <= 1 / 0.2
     weighted = (weights * lit(states)).mean().item()
     assert weighted == pytest.approx(0.09, abs=0.04)
+
+
+def test_losses_count_among_those_of_their_time() -> None:
+    """Else those of the untrained network would decide for as long as they are remembered."""
+    found = sampler(memory=1024, importance=Importance(uniform_share=0.2, power=4.0))
+    states, _ = explored(found, batches=150, untrained=30)
+    assert lit(states).mean() > 3 * 0.09
 
 
 def test_without_weights_nothing_weighs() -> None:
