@@ -5,10 +5,12 @@ from __future__ import annotations
 import io
 import json
 import multiprocessing
+import os
 from collections.abc import Iterable, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from functools import partial
 from pathlib import Path
+from threading import Thread
 from typing import Any, NamedTuple
 
 import pandas as pd
@@ -80,6 +82,15 @@ def _wait(futures: Iterable[Future[None]], bar: tqdm[Any]) -> None:
 def _prepare_process() -> None:
     torch.set_num_threads(1)  # the networks are small, and the other cores have their own runs
     keep_freed_memory()
+    Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """Else a worker would wait for ever where the parent was killed and could not tell it."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)
 
 
 def _run_to_file(run: Run, *, plan: Plan, folder: Path) -> None:

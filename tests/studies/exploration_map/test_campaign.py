@@ -1,4 +1,9 @@
 import json
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -96,6 +101,33 @@ def test_provenance_holds_what_a_run_is_built_from(
     assert {"commit", "versions", "machine"} <= found.keys()
     assert found["size"] == {"steps": 4, "evaluations": 2, "frames": 20}
     assert found["configuration"]["loss_greedy-reuse"]["reuse"]["policy"]["beta"] == 2.0
+
+
+def test_no_process_is_left_where_the_first_one_is_killed(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "ngi.studies.exploration_map", "--settings", "smoke"]
+    command += ["--seeds", "0", "--jobs", "2", "--output", str(tmp_path)]
+    process = subprocess.Popen(command, stderr=subprocess.DEVNULL)
+    wait_until(lambda: any(tmp_path.glob("runs/*/*.csv")), "no run is finished")
+    children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+    assert len(children) >= 2
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    wait_until(lambda: not any(map(runs, children)), "some are left")
+
+
+def runs(pid: str) -> bool:
+    """Whether there is such a process, and not just its status for a parent to ask for."""
+    try:
+        return Path("/proc", pid, "stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+
+
+def wait_until(done: Callable[[], bool], otherwise: str) -> None:
+    end = time.monotonic() + 120
+    while not done():
+        assert time.monotonic() < end, otherwise
+        time.sleep(0.1)
 
 
 def test_command_line(
