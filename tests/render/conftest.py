@@ -6,6 +6,8 @@ import pytest
 from ngi.machine.backend import llvm_problem
 from ngi.render.mitsuba_renderer import MitsubaRenderer
 from ngi.scene import read_scene
+from tests.render.optics import write_scene
+from tests.render.specular_scenes import COLOURS, PAINT
 
 BOX = Path(__file__).parent / "scenes" / "box"
 
@@ -34,5 +36,22 @@ def load_box() -> Callable[..., MitsubaRenderer]:
         if key not in loaded:
             loaded[key] = MitsubaRenderer(scene=read_scene(BOX), backend=backend, **arguments)
         return loaded[key]
+
+    return load
+
+
+@pytest.fixture
+def load_specular(tmp_path):
+    def load(shapes, *, backend, variables=(PAINT,), max_depth=10, fov=20, **arguments):
+        write_scene(
+            tmp_path,
+            shapes=shapes,
+            variables=variables,
+            max_depth=max_depth,
+            fov=fov,
+            image=COLOURS,
+        )
+        arguments = {"specular": "traced", "buffer_samples": 1, "patch_size": 8} | arguments
+        return MitsubaRenderer(scene=read_scene(tmp_path), backend=backend, **arguments)
 
     return load

@@ -13,7 +13,7 @@ from tests.render.optics import (
     rays,
     rectangle,
 )
-from tests.render.specular.scenes import (
+from tests.render.specular_scenes import (
     BACK,
     GLASS,
     INDEX,
@@ -31,10 +31,10 @@ from tests.render.specular.scenes import (
 )
 
 
-def test_a_variable_roughness_decides_at_every_v(load, backend) -> None:
+def test_a_variable_roughness_decides_at_every_v(load_specular, backend) -> None:
     steel = ROUGH.format(alpha='<float name="alpha" value="0.3"/>')
     shapes = BACK + SIDE + SKY + rectangle("mirror", TILTED, steel)
-    renderer = load(shapes, backend=backend, variables=[STEEL])
+    renderer = load_specular(shapes, backend=backend, variables=[STEEL])
     end, _, _, met = mirror()
     for v, alpha in ((0.0, 0.01), (0.45, 0.046)):
         seen = buffers(renderer, [v])
@@ -50,11 +50,13 @@ def test_a_variable_roughness_decides_at_every_v(load, backend) -> None:
     assert (seen["throughput"] == 1).all()
 
 
-def test_a_textured_roughness_decides_ray_by_ray(load, backend) -> None:
+def test_a_textured_roughness_decides_ray_by_ray(load_specular, backend) -> None:
     alpha = '<texture type="checkerboard" name="alpha"><rgb name="color0" value="0.02"/>\
 <rgb name="color1" value="0.3"/></texture>'
     steel = ROUGH.format(alpha=alpha)
-    seen = buffers(load(BACK + SIDE + SKY + rectangle("mirror", TILTED, steel), backend=backend))
+    seen = buffers(
+        load_specular(BACK + SIDE + SKY + rectangle("mirror", TILTED, steel), backend=backend)
+    )
     _, _, _, met = mirror()
     smooth = np.isclose(seen["chain_roughness"][met], 0.02, rtol=1e-4)
     assert 0.3 < smooth.mean() < 0.7
@@ -62,20 +64,22 @@ def test_a_textured_roughness_decides_ray_by_ray(load, backend) -> None:
     np.testing.assert_allclose(seen["roughness"][met][smooth], 1)
 
 
-def test_roughness_of_a_chain_adds_in_squares(load, backend) -> None:
+def test_roughness_of_a_chain_adds_in_squares(load_specular, backend) -> None:
     glass = GLASS.replace('"dielectric"', '"roughdielectric"').replace(
         "</bsdf>", '<float name="alpha" value="0.03"/></bsdf>'
     )
-    seen = buffers(load(BACK + PLATE.replace(GLASS, glass), backend=backend))
+    seen = buffers(load_specular(BACK + PLATE.replace(GLASS, glass), backend=backend))
     end, _, throughput, met = slab()
     np.testing.assert_allclose(seen["chain_roughness"][met], 0.03 * np.sqrt(2), rtol=1e-4)
     np.testing.assert_allclose(seen["position"][met], end[met], atol=2e-3)
     np.testing.assert_allclose(seen["throughput"][met], throughput[met], atol=1e-4)
 
 
-def test_thin_glass_passes_straight(load, backend) -> None:
+def test_thin_glass_passes_straight(load_specular, backend) -> None:
     pane = GLASS.replace('"dielectric"', '"thindielectric"')
-    seen = buffers(load(BACK + rectangle("pane", '<scale value="2"/>', pane), backend=backend))
+    seen = buffers(
+        load_specular(BACK + rectangle("pane", '<scale value="2"/>', pane), backend=backend)
+    )
     d = rays(RESOLUTION)
     end = on_plane(ORIGIN, d, np.array([0, 0, -3.0]), [0, 0, 1])
     np.testing.assert_allclose(seen["position"], end, atol=1e-3)
@@ -84,11 +88,11 @@ def test_thin_glass_passes_straight(load, backend) -> None:
     np.testing.assert_allclose(seen["throughput"], expected, atol=1e-4)
 
 
-def test_a_variable_index_of_thin_glass(load, backend) -> None:
+def test_a_variable_index_of_thin_glass(load_specular, backend) -> None:
     pane = GLASS.replace('"dielectric"', '"thindielectric"')
     shapes = BACK + rectangle("pane", '<scale value="2"/>', pane)
     variable = "{object: glass, property: eta, minimum: 1.2, maximum: 2.2}"
-    renderer = load(shapes, backend=backend, variables=[variable])
+    renderer = load_specular(shapes, backend=backend, variables=[variable])
     d = rays(RESOLUTION)
     for v in (0.0, 0.3, 1.0):
         share = fresnel(-d[..., 2:], 1.2 + v)
@@ -97,11 +101,13 @@ def test_a_variable_index_of_thin_glass(load, backend) -> None:
 
 
 @pytest.mark.parametrize("two_sided", [True, False])
-def test_a_conductor_from_behind(load, backend, two_sided) -> None:
+def test_a_conductor_from_behind(load_specular, backend, two_sided) -> None:
     plain = '<bsdf type="conductor"><rgb name="specular_reflectance" value="0.8"/></bsdf>'
     bsdf = f'<bsdf type="twosided">{plain}</bsdf>' if two_sided else plain
     turned = '<scale value="1.2"/><rotate y="1" angle="225"/>'
-    seen = buffers(load(BACK + SIDE + SKY + rectangle("mirror", turned, bsdf), backend=backend))
+    seen = buffers(
+        load_specular(BACK + SIDE + SKY + rectangle("mirror", turned, bsdf), backend=backend)
+    )
     end, _, _, met = mirror()
     if not two_sided:
         end = on_plane(ORIGIN, rays(RESOLUTION), np.zeros(3), MIRROR_NORMAL)
@@ -109,11 +115,11 @@ def test_a_conductor_from_behind(load, backend, two_sided) -> None:
     np.testing.assert_allclose(seen["throughput"][met], 0.8 if two_sided else 1, rtol=1e-5)
 
 
-def test_a_mapped_mirror_is_not_followed(load, backend) -> None:
+def test_a_mapped_mirror_is_not_followed(load_specular, backend) -> None:
     bumps = '<bsdf type="bumpmap"><texture type="bitmap" name="arbitrary">\
 <string name="filename" value="picture.png"/></texture>{}</bsdf>'
     shapes = BACK + rectangle("mirror", TILTED, bumps.format('<bsdf type="conductor"/>'))
-    assert "throughput" not in load(shapes, backend=backend).layout.names
+    assert "throughput" not in load_specular(shapes, backend=backend).layout.names
 
 
 def test_a_scene_without_specular_surfaces_is_the_same_as_learned(box_folder, backend) -> None:

@@ -13,7 +13,7 @@ from tests.learn.command_line import SMALL, run
 from tests.render.optics import (
     rectangle,
 )
-from tests.render.specular.scenes import (
+from tests.render.specular_scenes import (
     BACK,
     BALL,
     PICTURE,
@@ -28,18 +28,20 @@ from tests.render.specular.scenes import (
 )
 
 
-def test_llvm_equals_scalar(load) -> None:
+def test_llvm_equals_scalar(load_specular) -> None:
     if (problem := llvm_problem()) is not None:
         pytest.skip(problem)
     for name in ("sphere", "mirror and slab"):
         fov = 32 if name == "sphere" else 20
-        a, b = (buffers(load(SCENES[name], backend=b, fov=fov)) for b in ("llvm", "scalar"))
+        a, b = (
+            buffers(load_specular(SCENES[name], backend=b, fov=fov)) for b in ("llvm", "scalar")
+        )
         assert a.keys() == b.keys()
         different = np.any([(abs(a[n] - b[n]) > 1e-2).any(-1) for n in a], axis=0)
         assert different.mean() < 0.01  # rays that meet an edge
 
 
-def test_patches_show_the_same_and_nothing_is_compiled_after_warm_up(load) -> None:
+def test_patches_show_the_same_and_nothing_is_compiled_after_warm_up(load_specular) -> None:
     if (problem := llvm_problem()) is not None:
         pytest.skip(problem)
     steel = ROUGH.format(alpha='<float name="alpha" value="0.3"/>')
@@ -47,7 +49,7 @@ def test_patches_show_the_same_and_nothing_is_compiled_after_warm_up(load) -> No
     shapes = BACK + SIDE + SKY + rectangle("mirror", TILTED, steel) + ball
     shapes = shapes.replace(PICTURE, PLAIN)  # a frozen function can't sample a textured emitter
     ball_moves = "{object: ball, property: translation, minimum: [0, -1, 0], maximum: [0, 1, 0]}"
-    renderer = load(shapes, backend="llvm", variables=[STEEL, ball_moves])
+    renderer = load_specular(shapes, backend="llvm", variables=[STEEL, ball_moves])
     renderer.warm_up()
     generator = torch.Generator().manual_seed(0)
     states = [torch.rand(4, 4, generator=generator) for _ in range(20)]
@@ -62,9 +64,9 @@ def test_patches_show_the_same_and_nothing_is_compiled_after_warm_up(load) -> No
         )
 
 
-def test_other_words_are_refused(load) -> None:
+def test_other_words_are_refused(load_specular) -> None:
     with pytest.raises(ValueError, match="choose one of learned, traced"):
-        load(SCENES["slab"], backend="scalar", specular="mirrored")
+        load_specular(SCENES["slab"], backend="scalar", specular="mirrored")
 
 
 def test_layout_and_the_analytic_renderer() -> None:
