@@ -12,6 +12,7 @@ import torch
 from torch import Tensor
 
 from ngi.render import AnalyticRenderer, RenderedPatches
+from tests.waiting import wait_for
 
 
 class OddRenderer(AnalyticRenderer):
@@ -66,13 +67,6 @@ def assert_same(a, b) -> None:
     assert torch.equal(a.buffers, b.buffers)
     assert torch.equal(a.log_radiance, b.log_radiance)
     assert (a.repaired, a.masked, a.paths) == (b.repaired, b.masked, b.paths)
-
-
-def wait_for(condition) -> None:
-    deadline = time.monotonic() + 60
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
 
 
 def processes() -> set[int]:

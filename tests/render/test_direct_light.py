@@ -1,7 +1,6 @@
 """Traced direct light against closed forms; `test_shipped_scenes` compares whole scenes."""
 
 import numpy as np
-import pandas as pd
 import pytest
 import torch
 
@@ -13,8 +12,8 @@ from ngi.render.mitsuba_renderer import MitsubaRenderer
 from ngi.render.tracing import subpixel_points
 from ngi.scene import read_scene
 from ngi.studies.benchmark.measure import counted_compilations
-from tests.learn.command_line import SMALL, run
 from tests.render.optics import ORIGIN, on_plane, rays, rectangle, unit, write_scene
+from tests.render.trained import stored_buffers
 
 RESOLUTION = 16
 ALBEDO = np.array([0.8, 0.5, 0.2])
@@ -162,15 +161,9 @@ def test_it_depends_on_no_seed_and_patches_show_the_image(load, backend) -> None
     assert first[..., renderer.layout.slice("direct")].std() > 0.01
 
 
-def test_every_other_buffer_and_the_radiance_stay_as_they_are(box_folder, backend) -> None:
+def test_every_other_buffer_and_the_radiance_stay_as_they_are(load_box, backend) -> None:
     learned, traced = (
-        MitsubaRenderer(
-            scene=read_scene(box_folder),
-            backend=backend,
-            patch_size=8,
-            buffer_samples=1,
-            **options,
-        )
+        load_box(backend, patch_size=8, buffer_samples=1, **options)
         for options in ({}, {"direct": "traced"})
     )
     assert traced.layout.names == (*learned.layout.names[:-1], "direct", "emission")
@@ -263,17 +256,5 @@ def test_layout_and_the_analytic_renderer() -> None:
 
 
 def test_the_program_trains_on_it(tmp_path) -> None:
-    options = (
-        "scene=sphere-caustic",
-        "renderer.direct=traced",
-        "renderer.samples_per_pixel=2",
-        "evaluation.evaluator.protocol.resolution=32",
-        "run.folder=run",
-    )
-    small = [option for option in SMALL if option != "renderer=analytic"]
-    status, output = run(tmp_path, *options, base=tuple(small))
-    assert status == 0, output
-    state = torch.load(tmp_path / "run" / "last.ckpt", weights_only=True)
-    buffers = state["ExplorationDataModule"]["store"]["buffers"]
+    buffers = stored_buffers(tmp_path, "scene=sphere-caustic", "renderer.direct=traced")
     assert buffers[-2:] == ["direct", "emission"]
-    assert len(pd.read_csv(tmp_path / "run" / "steps.csv")) == 12

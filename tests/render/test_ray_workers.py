@@ -13,7 +13,8 @@ import ray
 
 from ngi.render.ray_workers import Share, share_out
 from ngi.render.workers import WorkerRenderer
-from tests.render.odd_renderer import OddRenderer, assert_same, render, states, wait_for
+from tests.render.odd_renderer import OddRenderer, assert_same, render, states
+from tests.waiting import wait_for
 
 
 @pytest.fixture

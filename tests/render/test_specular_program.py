@@ -1,7 +1,6 @@
 """Traced bounces in all backends, in patches, and in a training run."""
 
 import numpy as np
-import pandas as pd
 import pytest
 import torch
 
@@ -9,7 +8,6 @@ from ngi.machine.backend import llvm_problem
 from ngi.patches import BufferLayout
 from ngi.render import AnalyticRenderer
 from ngi.studies.benchmark.measure import counted_compilations
-from tests.learn.command_line import SMALL, run
 from tests.render.optics import (
     rectangle,
 )
@@ -26,6 +24,7 @@ from tests.render.specular_scenes import (
     TILTED,
     buffers,
 )
+from tests.render.trained import stored_buffers
 
 
 def test_llvm_equals_scalar(load_specular) -> None:
@@ -80,18 +79,5 @@ def test_layout_and_the_analytic_renderer() -> None:
 
 
 def test_the_program_trains_on_traced_buffers(tmp_path) -> None:
-    options = (
-        "scene=mirror",
-        "renderer.specular=traced",
-        "renderer.samples_per_pixel=2",
-        "evaluation.evaluator.protocol.resolution=32",
-        "run.folder=run",
-    )
-    small = [option for option in SMALL if option != "renderer=analytic"]
-    status, output = run(tmp_path, *options, base=tuple(small))
-    assert status == 0, output
-    state = torch.load(tmp_path / "run" / "last.ckpt", weights_only=True)
-    buffers = state["ExplorationDataModule"]["store"]["buffers"]
+    buffers = stored_buffers(tmp_path, "scene=mirror", "renderer.specular=traced")
     assert buffers[-2:] == ["throughput", "emission"]
-    losses = pd.read_csv(tmp_path / "run" / "steps.csv")
-    assert len(losses) == 12

@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 import torch
 
-from ngi.render.mitsuba_renderer import MitsubaRenderer
-from ngi.scene import read_scene
 from tests.render.optics import (
     ORIGIN,
     fresnel,
@@ -122,16 +120,10 @@ def test_a_mapped_mirror_is_not_followed(load_specular, backend) -> None:
     assert "throughput" not in load_specular(shapes, backend=backend).layout.names
 
 
-def test_a_scene_without_specular_surfaces_is_the_same_as_learned(box_folder, backend) -> None:
+def test_a_scene_without_specular_surfaces_is_the_same_as_learned(load_box, backend) -> None:
     """The box: its metal varies from alpha = 0.1 up, and plastic is not followed."""
     learned, traced = (
-        MitsubaRenderer(
-            scene=read_scene(box_folder),
-            backend=backend,
-            patch_size=8,
-            buffer_samples=1,
-            specular=specular,
-        )
+        load_box(backend, patch_size=8, buffer_samples=1, specular=specular)
         for specular in ("learned", "traced")
     )
     assert traced.layout == learned.layout

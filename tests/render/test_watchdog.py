@@ -10,7 +10,8 @@ from ngi.render import watchdog
 from ngi.render.watchdog import SHORTEST_SECONDS, STARTING_SECONDS, Watchdog
 from ngi.render.worker_pool import WorkerPool
 from ngi.render.worker_protocol import Request, WorkerDiedError
-from tests.render.odd_renderer import OddRenderer, assert_same, states, wait_for
+from tests.render.odd_renderer import OddRenderer, assert_same, states
+from tests.waiting import wait_for
 
 
 class Silent:

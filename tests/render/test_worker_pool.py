@@ -15,7 +15,8 @@ from ngi.machine.backend import dr
 from ngi.render import AnalyticRenderer, workers
 from ngi.render.worker_protocol import RenderServer, WorkerDiedError
 from ngi.render.workers import WorkerRenderer, chunk_sizes
-from tests.render.odd_renderer import OddRenderer, assert_same, render, states, wait_for
+from tests.render.odd_renderer import OddRenderer, assert_same, render, states
+from tests.waiting import wait_for
 
 make = partial(OddRenderer, gate=Path("nowhere"))
 

@@ -30,8 +30,8 @@ from tests.render.odd_renderer import (
     processes,
     render,
     states,
-    wait_for,
 )
+from tests.waiting import wait_for
 
 
 @pytest.fixture(scope="module")

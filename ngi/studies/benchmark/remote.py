@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from multiprocessing import get_context
 from typing import Any
 
+from ngi.machine.child_process import end_with_parent
 from ngi.machine.memory import keep_freed_memory
 
 _made: list[Any] = []
@@ -31,7 +32,8 @@ def remote(
 
     environment: variables that only that process has.
     """
-    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+    context = get_context("spawn")
+    with ProcessPoolExecutor(1, mp_context=context, initializer=end_with_parent) as pool:
         with _variables(environment or {}):
             made = pool.submit(_make, make)
         made.result()

@@ -5,12 +5,10 @@ from __future__ import annotations
 import io
 import json
 import multiprocessing
-import os
 from collections.abc import Iterable, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from functools import partial
 from pathlib import Path
-from threading import Thread
 from typing import Any, NamedTuple
 
 import pandas as pd
@@ -18,6 +16,7 @@ import torch
 from tqdm import tqdm
 
 from ngi.files.durable import write_atomically
+from ngi.machine.child_process import end_with_parent
 from ngi.machine.memory import keep_freed_memory
 from ngi.machine.provenance import provenance
 from ngi.render import PocketRenderer
@@ -82,15 +81,7 @@ def _wait(futures: Iterable[Future[None]], bar: tqdm[Any]) -> None:
 def _prepare_process() -> None:
     torch.set_num_threads(1)  # the networks are small, and the other cores have their own runs
     keep_freed_memory()
-    Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    """Else a worker would wait for ever where the parent was killed and could not tell it."""
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-    parent.join()
-    os._exit(1)
+    end_with_parent()
 
 
 def _run_to_file(run: Run, *, plan: Plan, folder: Path) -> None:

@@ -2,8 +2,6 @@ import json
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +12,7 @@ from ngi.studies.exploration_map import campaign
 from ngi.studies.exploration_map.__main__ import main
 from ngi.studies.exploration_map.plan import BASE, Plan
 from ngi.studies.exploration_map.setting import METHODS, Method
+from tests.waiting import wait_for
 
 PLAN = Plan(settings=(BASE, replace(BASE, volume=0.1)), steps=4, evaluations=2, frames=20)
 
@@ -107,12 +106,12 @@ def test_no_process_is_left_where_the_first_one_is_killed(tmp_path: Path) -> Non
     command = [sys.executable, "-m", "ngi.studies.exploration_map", "--settings", "smoke"]
     command += ["--seeds", "0", "--jobs", "2", "--output", str(tmp_path)]
     process = subprocess.Popen(command, stderr=subprocess.DEVNULL)
-    wait_until(lambda: any(tmp_path.glob("runs/*/*.csv")), "no run is finished")
+    wait_for(lambda: any(tmp_path.glob("runs/*/*.csv")), seconds=120)
     children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
     assert len(children) >= 2
     process.send_signal(signal.SIGKILL)
     process.wait()
-    wait_until(lambda: not any(map(runs, children)), "some are left")
+    wait_for(lambda: not any(map(runs, children)), seconds=120)
 
 
 def runs(pid: str) -> bool:
@@ -121,13 +120,6 @@ def runs(pid: str) -> bool:
         return Path("/proc", pid, "stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except (FileNotFoundError, ProcessLookupError):
         return False
-
-
-def wait_until(done: Callable[[], bool], otherwise: str) -> None:
-    end = time.monotonic() + 120
-    while not done():
-        assert time.monotonic() < end, otherwise
-        time.sleep(0.1)
 
 
 def test_command_line(
