@@ -164,6 +164,8 @@ def _live_view(config: DictConfig, run: learn.Run) -> LiveView:
 
 @hydra.main(version_base="1.3", config_path=str(root() / "conf"), config_name="train")
 def _main(config: DictConfig) -> None:
+    from ngi.render.sampling_advice import pilot_advice
+
     try:
         result = train(config)
     except MESSAGES as error:
@@ -174,6 +176,8 @@ def _main(config: DictConfig) -> None:
         config.run.folder,
         ", ".join(f"{name} {value['mean']:.4g}" for name, value in hard.items() if value),
     )
+    if (share := result.get("new_worst_share")) is not None:
+        log.info("%s", pilot_advice(share))
 
 
 @hydra.main(version_base="1.3", config_path=str(root() / "conf"), config_name="train")

@@ -49,6 +49,7 @@ class Recorder:
             **{f"{name}_seconds": value for name, value in self._run.run_clock.seconds.items()},
             "patches_traced": self._run.stream.counters.patches_traced,
             "paths_traced": self._run.stream.counters.paths_traced,
+            "new_worst_share": self._run.stream.new_losses.worst_share,
             **usage(self._run.folder.path),
             **evaluation.row(),
         }
@@ -94,6 +95,7 @@ class Recorder:
             "steps_refused": counters.steps_refused,
             "steps_scaled": counters.steps_scaled,
             "non_finite_losses": self._run.stream.store.non_finite_losses,
+            "new_worst_share": self._run.stream.new_losses.worst_share,
             "scene_hash": self._run.folder.settings["scene"]["hash"],
             **evaluation.result(),
             "linear": linear,

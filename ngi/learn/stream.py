@@ -22,6 +22,7 @@ from ngi.explore import ChainInfo, ChainState, ResolutionSchedule, Sampler
 from ngi.learn.ahead import ProposalsAhead
 from ngi.learn.batch import Batch, Feedback
 from ngi.learn.chain_trace import chain_record, chain_row
+from ngi.learn.new_losses import NewLosses
 from ngi.learn.noise import without_noise
 from ngi.learn.samples import Samples
 from ngi.learn.saved_stores import SavedStores
@@ -70,6 +71,7 @@ class TrainingStream:
         self.saved_stores = SavedStores(reuse.store, reuse.archive)
         self.clock = clock
         self.counters = Counters()
+        self.new_losses = NewLosses()
         self.reuse_probability = 0.0
         self.chain_record: dict[str, np.ndarray] | None = None  # of a generated batch
         self._chain_info: ChainInfo | None = None
@@ -167,6 +169,7 @@ class TrainingStream:
             raise RuntimeError("the last step is not finished; call settle() before it is saved")
         return {
             "counters": dict(vars(self.counters)),
+            "new_losses": self.new_losses.state_dict(),
             "chains": self.chains.state_dict(),
             "policy": self._policy_state.state_dict(),
             "generator": self._generator.get_state(),
@@ -176,6 +179,7 @@ class TrainingStream:
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         self.counters = Counters(**state["counters"])
+        self.new_losses.load_state_dict(state["new_losses"])
         self.chains = type(self.chains).from_state_dict(state["chains"])
         self._policy_state = type(self._policy_state).from_state_dict(state["policy"])
         self._generator.set_state(state["generator"])
@@ -277,6 +281,9 @@ class TrainingStream:
     def _accept(self, batch: Batch, feedback: Feedback) -> None:
         assert self._ahead is not None
         losses = feedback.losses.detach().float().cpu()
+        if feedback.noise is not None:
+            losses = without_noise(losses, feedback.noise)
+        self.new_losses.add(losses)
         unscored = torch.zeros(self.sampler.chains)  # looked at by no rule
         proposed, current = feedback.target_proposed, feedback.target_current
         self.chains, self._chain_info = self.sampler.accept(
@@ -286,7 +293,7 @@ class TrainingStream:
             target_current=unscored if current is None else current,
             target_proposed=unscored if proposed is None else proposed,
             generator=self._generator,
-            losses=losses if feedback.noise is None else without_noise(losses, feedback.noise),
+            losses=losses,
         )
         self.chain_record = chain_record(
             self._ahead.proposals,

@@ -13,7 +13,10 @@ from ngi.scene.scene_parameters import emits
 from ngi.scene.variable import Variable
 from ngi.scene.variable_scene import VariableScene
 
-PAGE = "docs/exploration-ceiling, 'Which sampler when'"
+PAGE = "docs/guide/sampler.md"
+
+CONCENTRATED = 0.3
+"""Share of the loss on the worst 5 % of a pilot run's patches from which on a choice pays."""
 
 SHINY = 0.1
 """Roughness (alpha) up to which a surface gathers light into caustics."""
@@ -34,8 +37,8 @@ def sampling_advice(scene: VariableScene, materials: list[Material]) -> list[str
     lines = ["sampler=sobol: no choice of patches by their error gained anything measurable"]
     if causes := _rare(scene, materials):
         lines.append(
-            "sampler=predicted_loss data=denoised_halves, once half of a pilot run's mean error is "
-            f"on few frames: {' and '.join(causes)}"
+            f"sampler=predicted_loss data=denoised_halves, where {CONCENTRATED:.0%} and more of a "
+            f"pilot run's loss is on the worst 5% of its patches: {' and '.join(causes)}"
         )
     spp = scene.description.samples_per_pixel
     if spp >= DEAR:
@@ -44,6 +47,17 @@ def sampling_advice(scene: VariableScene, materials: list[Material]) -> list[str
             "than any choice of few"
         )
     return [*lines, f"see {PAGE}"]
+
+
+def pilot_advice(worst_share: float) -> str:
+    """One line: what a run says of the sampler for the next one.
+
+    worst_share: of the loss of its new patches, see `ngi.learn.new_losses`
+    """
+    return (
+        f"the worst 5% of the new patches had {worst_share:.0%} of the loss "
+        f"(if drawn uniformly, sampler=predicted_loss pays from {CONCENTRATED:.0%} on: {PAGE})"
+    )
 
 
 def _rare(scene: VariableScene, materials: list[Material]) -> list[str]:

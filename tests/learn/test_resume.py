@@ -7,6 +7,7 @@ import pytest
 import torch
 
 from ngi.clock.phase_clock import PHASES
+from ngi.render.sampling_advice import pilot_advice
 from tests.learn.command_line import BRIEF, run, start
 from tests.learn.comparison import assert_same, final_state
 
@@ -81,6 +82,9 @@ def test_a_finished_run_is_not_run_again(tmp_path: Path, unbroken: Path) -> None
     status, output = run(tmp_path, *COMMAND, f"run.folder={unbroken}")
     assert status == 0, output
     assert "finished already" in output
+    result = json.loads((unbroken / "result.json").read_text())
+    assert pilot_advice(result["new_worst_share"]) in output
+    assert pd.read_csv(unbroken / "metrics.csv")["new_worst_share"].between(0.05, 1).all()
     after = {p: p.stat().st_mtime_ns for p in unbroken.glob("*.*")}
     touched = {p.name for p in before if before[p] != after[p]}
     assert touched <= {"settings.json", ".lock", "train.log"}

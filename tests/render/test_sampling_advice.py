@@ -2,9 +2,10 @@
 
 import pytest
 
+from ngi.files.resources import root
 from ngi.machine.backend import activate
 from ngi.render.materials import collect_materials
-from ngi.render.sampling_advice import sampling_advice
+from ngi.render.sampling_advice import PAGE, pilot_advice, sampling_advice
 from ngi.scene import read_scene
 from ngi.scene.variable_scene import VariableScene
 
@@ -52,7 +53,7 @@ def test_where_no_light_moves_nothing_is_rare(advice, variables) -> None:
     assert text.startswith("sampler=sobol: ")
     assert "predicted_loss" not in text
     assert "samples_per_pixel" not in text
-    assert text.count("docs/exploration-ceiling") == 1
+    assert text.count("docs/guide/sampler.md") == 1
 
 
 @pytest.mark.parametrize(
@@ -81,3 +82,10 @@ def test_smooth_surfaces_make_caustics_of_it(advice, ball, variables, caustics) 
 
 def test_where_patches_are_dear_more_of_them_come_first(advice) -> None:
     assert "samples_per_pixel=32 instead of 24000" in advice(PAINT, samples=24000)
+
+
+def test_a_pilot_run_says_how_concentrated_its_loss_is_and_what_follows() -> None:
+    text = pilot_advice(0.083)
+    assert "had 8% of the loss" in text
+    assert "sampler=predicted_loss pays from 30% on" in text
+    assert (root() / PAGE).is_file()

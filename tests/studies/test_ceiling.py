@@ -162,11 +162,6 @@ def test_choices_of_one_seed_begin_with_the_same_patches(recorded) -> None:
     assert not torch.equal(uniform.added[0], other.added[0])
 
 
-def test_equal_errors_are_not_concentrated_and_a_single_one_is() -> None:
-    assert runs.worst_share(torch.full((40,), 0.3)) == pytest.approx(0.05)
-    assert runs.worst_share(torch.eye(1, 40)[0]) == 1
-
-
 def test_the_oracle_draws_in_proportion_to_the_true_error(recorded) -> None:
     """Over 0 … 999 the mean is 499.5 for uniform draws and 666 in proportion to the error."""
     means = {

@@ -11,6 +11,7 @@ from torch import Tensor
 
 from ngi.evaluate import METRICS, SETS, Evaluation, Evaluator
 from ngi.explore import Importance
+from ngi.learn.new_losses import worst_share
 from ngi.reuse import CompactPatches
 from ngi.studies.ceiling.pool import chosen
 from ngi.studies.ceiling.training import Training
@@ -99,12 +100,6 @@ def do(
     return {**run._asdict(), **measured(evaluator.evaluate(training.predict)), "worst_share": share}
 
 
-def worst_share(errors: Tensor) -> float:
-    """Part of the sum of errors [n] that the largest 5 % of them make; 0.05 where all are equal."""
-    errors = errors.double()
-    return (_worst(errors).sum() / errors.sum()).item()
-
-
 def true_errors(
     training: Training, pool: CompactPatches, truth: Tensor, candidates: Tensor
 ) -> Tensor:
@@ -138,12 +133,7 @@ def _tail(evaluation: Evaluation, name: str) -> float:
             if each.frame.set == name
         ]
     )
-    return _worst(errors).mean().item()
-
-
-def _worst(errors: Tensor) -> Tensor:
-    """The largest 5 % of [n]."""
-    return errors.topk(math.ceil(TAIL * len(errors))).values
+    return errors.topk(math.ceil(TAIL * len(errors))).values.mean().item()
 
 
 def _part(whole: int, number: int, parts: int) -> int:

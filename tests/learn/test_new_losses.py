@@ -1,0 +1,36 @@
+"""How concentrated the losses of new patches are, against closed forms and NumPy."""
+
+import math
+
+import numpy as np
+import pytest
+import torch
+
+from ngi.learn.new_losses import REMEMBERED, NewLosses, worst_share
+
+
+def test_equal_losses_are_not_concentrated_and_a_single_one_is() -> None:
+    assert worst_share(torch.full((40,), 0.3)) == pytest.approx(0.05)
+    assert worst_share(torch.eye(1, 40)[0]) == 1
+    assert math.isnan(worst_share(torch.zeros(40)))
+    assert math.isnan(worst_share(torch.zeros(0)))
+
+
+def test_exponential_losses_have_the_share_that_the_integral_says() -> None:
+    quantiles = (torch.arange(100_000, dtype=torch.float64) + 0.5) / 100_000
+    # Of an exponential distribution: p (1 - ln p) for the largest p of all.
+    share = 0.05 * (1 - math.log(0.05))
+    assert worst_share(-(1 - quantiles).log()) == pytest.approx(share, rel=1e-3)
+
+
+def test_the_newer_half_of_what_is_remembered_counts() -> None:
+    found = NewLosses()
+    assert math.isnan(found.worst_share)
+    losses = np.random.default_rng(3).lognormal(size=1500).astype(np.float32)
+    losses[REMEMBERED // 2 : 600] = 1000  # of an untrained network, old by now
+    for part in np.array_split(losses, 100):
+        found.add(torch.from_numpy(part))
+        found.add(torch.tensor([math.nan, math.inf]))
+    newest = np.sort(losses[-REMEMBERED // 2 :])
+    expected = newest[-math.ceil(0.05 * len(newest)) :].sum() / newest.sum()
+    assert found.worst_share == pytest.approx(expected, rel=1e-5)
