@@ -64,6 +64,8 @@ def components(settings: Mapping[str, Any], *, renderer: Renderer, scored: bool)
     """
     sampler = settings["sampler"]
     samples = {key: value for key, value in settings["data"].items() if not key.startswith("_")}
+    if renderer.halves:  # else nothing: what is measured already stays what it is called
+        samples["halves"] = True
     patches = {
         "patches": sampler["chains"],
         "patch_size": renderer.patch_size,
@@ -79,7 +81,7 @@ def components(settings: Mapping[str, Any], *, renderer: Renderer, scored: bool)
         **patches,
     }
     rendering = {
-        **_without(settings["renderer"], "scene", "workers", "cluster"),
+        **_without(settings["renderer"], "scene", "workers", "cluster", "halves"),
         "samples_per_pixel": renderer.samples_per_pixel,
         "scene": {"name": settings["scene"]["name"], "hash": renderer.scene_hash},
         "patches": sampler["chains"],

@@ -1,9 +1,7 @@
 """How much of a patch's loss is noise of the patch, which no network can learn.
 
-It is known of patches that are traced in two halves.
+It is known of patches that are traced in two halves (`renderer.halves`).
 """
-
-from dataclasses import replace
 
 import torch
 import torch.nn.functional as F
@@ -11,25 +9,6 @@ from torch import Tensor
 
 from ngi.learn.batch import Batch
 from ngi.models import SampleLoss
-from ngi.render.protocol import RenderedPatches
-
-
-def mean_of_halves(first: RenderedPatches, second: RenderedPatches) -> RenderedPatches:
-    """The mean of two renderings of the same patches, with other random numbers; `first_half` too.
-
-    Their buffers are those of the first; they have no noise. What it costs beside one rendering of
-    twice the samples is that the buffers are made twice.
-    """
-    mean = (first.log_radiance.expm1() + second.log_radiance.expm1()) / 2
-    return replace(
-        first,
-        log_radiance=mean.log1p(),
-        repaired=first.repaired + second.repaired,
-        masked=first.masked + second.masked,
-        paths=first.paths + second.paths,
-        first_half=first.log_radiance,
-    )
-
 
 BLURRED = 5
 """Pixels along the side of the square that stands in for the truth about its middle."""

@@ -9,10 +9,8 @@ import torch
 from torch import Tensor, nn
 
 from ngi.denoise import Denoiser, denoised
-from ngi.learn.noise import mean_of_halves
 from ngi.patches import BufferLayout, Patches
 from ngi.render.protocol import Deferred, PatchJob, Renderer
-from ngi.render.tracing import derive_seed
 
 Example = tuple[tuple[Tensor, ...], Tensor]
 """The network's inputs, its arguments in order, and the log1p radiance that it is to give."""
@@ -83,8 +81,6 @@ class PatchSamples(Samples):
         buffers say where the point is and which direction
     denoiser: takes the noise off newly traced radiance, or None
     traced_share: see `ngi.denoise.denoised`
-    halves: whether each patch is the mean of two renderings, so that its noise is known
-        (`ngi.learn.noise`); the renderer's samples per pixel are then those of each
 
     components: which of v, [0, D), the network is given, in order
     Raises ValueError for a share that is none.
@@ -97,12 +93,10 @@ class PatchSamples(Samples):
         camera: bool = True,
         denoiser: Denoiser | None = None,
         traced_share: float = 0.5,
-        halves: bool = False,
     ) -> None:
         if not 0 <= traced_share <= 1:
             raise ValueError(f"data.traced_share is {traced_share}; expected 0 to 1")
         self._renderer = renderer
-        self._halves = halves
         self.layout = renderer.layout
         self._denoise = None
         if denoiser is not None:
@@ -123,10 +117,6 @@ class PatchSamples(Samples):
 
     def start_patches(self, states: Tensor, *, resolution: int, seed: int) -> PatchJob:
         job = self._renderer.start_patches(states, resolution=resolution, seed=seed)
-        if self._halves:
-            other = derive_seed(seed, b"second half")
-            second = self._renderer.start_patches(states, resolution=resolution, seed=other)
-            job = Deferred(mean_of_halves, job, second)
         return job if self._denoise is None else Deferred(self._denoise, job)
 
     def example(self, patches: Patches) -> Example:

@@ -36,6 +36,7 @@ class AnalyticRenderer(ClosedFormRenderer):
         dimensions: int,
         patch_size: int,
         samples_per_pixel: int = 1,
+        halves: bool = False,
         noise: float = 0.0,
         layout: BufferLayout | None = None,
     ) -> None:
@@ -43,6 +44,7 @@ class AnalyticRenderer(ClosedFormRenderer):
             dimensions=dimensions,
             patch_size=patch_size,
             samples_per_pixel=samples_per_pixel,
+            halves=halves,
             noise=noise,
             layout=layout or BufferLayout(),
             formula=("analytic", FORMULA_VERSION),

@@ -9,7 +9,7 @@ from torch import Tensor
 
 from ngi.patches import BufferLayout, MovingPoints
 from ngi.render.protocol import RenderedPatches, Renderer
-from ngi.render.tracing import check_states, derive_seed, patch_window, require_positive
+from ngi.render.tracing import check_states, derive_seed, halved, patch_window, require_positive
 
 GOLDEN_RATIO = (1 + sqrt(5)) / 2
 
@@ -20,6 +20,7 @@ class ClosedFormRenderer(Renderer):
     Everything is evaluated at pixel centres, so that a patch equals the same pixels of the image.
 
     dimensions: D, at least 1. patch_size: P. samples_per_pixel: only scales the noise.
+    halves: see `MitsubaRenderer`.
     noise: relative standard deviation of the radiance at one sample per pixel, 0 for none.
     layout: which buffers there are.
     formula: name, version and numbers of the formula, for the scene's hash.
@@ -36,6 +37,7 @@ class ClosedFormRenderer(Renderer):
         dimensions: int,
         patch_size: int,
         samples_per_pixel: int,
+        halves: bool,
         noise: float,
         layout: BufferLayout,
         formula: tuple[object, ...],
@@ -50,6 +52,8 @@ class ClosedFormRenderer(Renderer):
         self.moving_points = MovingPoints.none(dimensions)
         self.patch_size = patch_size
         self.samples_per_pixel = samples_per_pixel
+        self.halves = halves
+        self._of_each = halved(samples_per_pixel) if halves else samples_per_pixel
         self.noise = noise
         content = (*formula, dimensions, float(noise), layout.names)
         self.scene_hash = sha256(repr(content).encode()).hexdigest()
@@ -68,16 +72,15 @@ class ClosedFormRenderer(Renderer):
         windows = [patch_window(p, patch_size=P, resolution=resolution) for p in states[:, -2:]]
         corners = torch.tensor([(w.x, w.y) for w in windows]).reshape(-1, 2)
         buffers, radiance = self.shade(states[:, :-2], _pixel_centres(corners, P, resolution))
-        if self.noise > 0:
-            for clean, state in zip(radiance, states, strict=True):
-                number = derive_seed(seed, state.numpy().tobytes(), resolution)
-                clean.copy_(self._noisy(clean, self.samples_per_pixel, number))
+        seeds = [seed, derive_seed(seed, b"second half")] if self.halves else [seed]
+        means = [self._noisy_patches(radiance, states, resolution, each) for each in seeds]
         return RenderedPatches(
             buffers=buffers,
-            log_radiance=torch.log1p(radiance),
+            log_radiance=torch.log1p(torch.stack(means).mean(dim=0)),
             repaired=0,
             masked=0,
             paths=len(states) * P * P * self.samples_per_pixel,
+            first_half=torch.log1p(means[0]) if self.halves else None,
         )
 
     def render_image(
@@ -112,6 +115,16 @@ class ClosedFormRenderer(Renderer):
         points = _pixel_centres(torch.zeros(1, 2), resolution, resolution)
         buffers, radiance = self.shade(v[None], points)
         return buffers[0], radiance[0]
+
+    def _noisy_patches(
+        self, radiance: Tensor, states: Tensor, resolution: int, seed: int
+    ) -> Tensor:
+        """[n, P, P, 3] of patches of the noise-free radiance, with each half's samples or all."""
+        if self.noise == 0 or len(states) == 0:
+            return radiance
+        numbers = [derive_seed(seed, state.numpy().tobytes(), resolution) for state in states]
+        patches = zip(radiance, numbers, strict=True)
+        return torch.stack([self._noisy(clean, self._of_each, number) for clean, number in patches])
 
     def _noisy(self, radiance: Tensor, samples: int, seed: int) -> Tensor:
         if self.noise == 0:

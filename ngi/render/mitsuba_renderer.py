@@ -26,6 +26,7 @@ from ngi.render.tracing import (
     check_states,
     choose,
     derive_seed,
+    halved,
     passes,
     patch_window,
     require_positive,
@@ -48,6 +49,7 @@ class MitsubaRenderer(Renderer):
     backend: 'auto', 'cuda', 'llvm' or 'scalar', see `ngi.machine.backend.activate`.
     patch_size: P, pixels along a patch's side.
     samples_per_pixel: of training patches; the scene's own number where None.
+    halves: patches tell by how much the first half of their samples is off, see `RenderedPatches`.
     buffer_samples: rays per pixel of the buffers; `BUFFER_SAMPLES` where None.
     specular: 'learned': the buffers are those of the first hit; 'traced': of the first hit that is
         not specular (paper, Fig. 10), see `ngi.render.specular`.
@@ -71,6 +73,7 @@ class MitsubaRenderer(Renderer):
         backend: str = "auto",
         patch_size: int = 32,
         samples_per_pixel: int | None = None,
+        halves: bool = False,
         buffer_samples: int | None = None,
         specular: str = "learned",
         direct: str = "learned",
@@ -107,7 +110,9 @@ class MitsubaRenderer(Renderer):
         self.dimensions = scene.dimensions
         self.patch_size = patch_size
         self.samples_per_pixel = samples_per_pixel or scene.samples_per_pixel
-        self._passes = passes(self.samples_per_pixel, patch_size**2)
+        self.halves = halves
+        of_each = halved(self.samples_per_pixel) if halves else self.samples_per_pixel
+        self._passes = passes(of_each, patch_size**2)
         self.moving_points = moving_points(self._scene)
         self.camera_part = scene.camera_part
         self.scene_hash = scene.scene_hash
@@ -141,14 +146,17 @@ class MitsubaRenderer(Renderer):
             radiance, buffers = results[index]
             results[index] = _masked(radiance), _masked(buffers)
         P = self.patch_size
-        radiance_tensor = _stack([r for r, _ in results], (P, P, 3))
+        parts = 2 if self.halves else 1
+        radiance_tensor = _stack([r for r, _ in results], (P, P, 3 * parts))
+        means = radiance_tensor.split(3, dim=-1)
         buffer_tensor = _stack([b for _, b in results], (P, P, self.layout.channels))
         return RenderedPatches(
             buffers=self._encode(buffer_tensor),
-            log_radiance=torch.log1p(radiance_tensor),
+            log_radiance=torch.log1p(torch.stack(means).mean(dim=0)),
             repaired=len(again),
             masked=len(masked),
             paths=(len(states) + len(again)) * P * P * self.samples_per_pixel,
+            first_half=torch.log1p(means[0]) if self.halves else None,
         )
 
     def render_image(
@@ -207,18 +215,23 @@ class MitsubaRenderer(Renderer):
     def _launch_patch(
         self, state: Tensor, resolution: int, seed: int, *, sizes: list[int], attempt: int = 0
     ) -> tuple[Pending, Pending]:
-        """sizes: samples per pixel of each launch."""
+        """Radiance, that of both halves one after the other in the last axis, and buffers.
+
+        sizes: samples per pixel of each launch, of one half where there are two
+        """
         window = patch_window(state[-2:], patch_size=self.patch_size, resolution=resolution)
         self._scene.apply(state[:-2])
         parts = (seed, state.numpy().tobytes(), resolution, attempt)
+        launched = sizes * (2 if self.halves else 1)
         launches = [
             self._tracer.radiance(window, samples=samples, seed=derive_seed(*parts, i))
-            for i, samples in enumerate(sizes)
+            for i, samples in enumerate(launched)
         ]
 
         def radiance() -> Tensor:
-            sums = [n * mean() for n, mean in zip(sizes, launches, strict=True)]
-            return torch.stack(sums).sum(dim=0) / sum(sizes)
+            sums = [n * mean() for n, mean in zip(launched, launches, strict=True)]
+            halves = torch.stack(sums).split(len(sizes))
+            return torch.cat([half.sum(dim=0) / sum(sizes) for half in halves], dim=-1)
 
         if not self._static:
             return radiance, self._tracer.buffers(window, samples=self.buffer_samples)

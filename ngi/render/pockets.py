@@ -64,6 +64,7 @@ class PocketRenderer(ClosedFormRenderer):
         patch_size: int,
         active: int | None = None,
         samples_per_pixel: int = 1,
+        halves: bool = False,
         noise: float = 0.0,
     ) -> None:
         active = min(dimensions, MOST_ACTIVE) if active is None else active
@@ -72,6 +73,7 @@ class PocketRenderer(ClosedFormRenderer):
             dimensions=dimensions,
             patch_size=patch_size,
             samples_per_pixel=samples_per_pixel,
+            halves=halves,
             noise=noise,
             layout=layout,
             formula=("pockets", FORMULA_VERSION, volume, pockets, float(sharpness), active),

@@ -18,7 +18,7 @@ class RenderedPatches:
     masked: number of patches that still held such pixels, which were then set to zero.
     paths: number of camera paths traced for the radiance.
     first_half: as log_radiance, by the first half of each pixel's samples alone; None where nobody
-        asked for it. How far it is from log_radiance tells the noise of that.
+        asked for it. How far it is from log_radiance tells the noise of that (`ngi.learn.noise`).
     """
 
     buffers: Tensor
@@ -75,6 +75,8 @@ class Renderer(Protocol):
     """P, pixels along a patch's side."""
     samples_per_pixel: int
     """spp of training patches."""
+    halves: bool = False
+    """Whether patches have `RenderedPatches.first_half`."""
     buffer_samples: int
     """Rays per pixel of the buffers."""
     moving_points: MovingPoints

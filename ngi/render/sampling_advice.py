@@ -37,7 +37,7 @@ def sampling_advice(scene: VariableScene, materials: list[Material]) -> list[str
     lines = ["sampler=sobol: no choice of patches by their error gained anything measurable"]
     if causes := _rare(scene, materials):
         lines.append(
-            f"sampler=predicted_loss data=denoised_halves, where {CONCENTRATED:.0%} and more of a "
+            f"sampler=predicted_loss renderer.halves=true, where {CONCENTRATED:.0%} and more of a "
             f"pilot run's loss is on the worst 5% of its patches: {' and '.join(causes)}"
         )
     spp = scene.description.samples_per_pixel

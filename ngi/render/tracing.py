@@ -94,6 +94,15 @@ def require_positive(**numbers: int) -> None:
             raise ValueError(f"renderer: {name} is {number}; expected a positive integer")
 
 
+def halved(samples: int) -> int:
+    """Samples per pixel of each half; ValueError for an odd number of them."""
+    if samples % 2:
+        raise ValueError(
+            f"renderer.samples_per_pixel is {samples}; renderer.halves=true needs an even number"
+        )
+    return samples // 2
+
+
 def choose(name: str, choice: str, *, among: tuple[str, ...]) -> None:
     """ValueError, naming it, for a choice that there is not."""
     if choice not in among:

@@ -81,8 +81,12 @@ class RenderServer:
         patches = self._renderer.render_patches(
             request.states, resolution=request.resolution, seed=request.seed
         )
+        half = patches.first_half
         return replace(
-            patches, buffers=patches.buffers.cpu(), log_radiance=patches.log_radiance.cpu()
+            patches,
+            buffers=patches.buffers.cpu(),
+            log_radiance=patches.log_radiance.cpu(),
+            first_half=None if half is None else half.cpu(),
         )
 
     def _start(self) -> None:

@@ -67,6 +67,7 @@ class WorkerRenderer(Renderer):
         self.dimensions = self._local.dimensions
         self.patch_size = self._local.patch_size
         self.samples_per_pixel = self._local.samples_per_pixel
+        self.halves = self._local.halves
         self.buffer_samples = self._local.buffer_samples
         self.moving_points = self._local.moving_points
         self.camera_part = self._local.camera_part
@@ -141,12 +142,14 @@ def _starter(make: bytes, *, workers: int, cluster: str | None) -> Callable[[int
 
 def _joined(*chunks: RenderedPatches) -> RenderedPatches:
     """A batch that was rendered in chunks."""
+    halves = [chunk.first_half for chunk in chunks if chunk.first_half is not None]
     return RenderedPatches(
         buffers=torch.cat([chunk.buffers for chunk in chunks]),
         log_radiance=torch.cat([chunk.log_radiance for chunk in chunks]),
         repaired=sum(chunk.repaired for chunk in chunks),
         masked=sum(chunk.masked for chunk in chunks),
         paths=sum(chunk.paths for chunk in chunks),
+        first_half=torch.cat(halves) if halves else None,
     )
 
 

@@ -95,7 +95,11 @@ def _step_seconds(
     from ngi.studies.step_costs import StepTimer, step_seconds
 
     stand_in = AnalyticRenderer(
-        dimensions=renderer.dimensions, patch_size=renderer.patch_size, layout=renderer.layout
+        dimensions=renderer.dimensions,
+        patch_size=renderer.patch_size,
+        samples_per_pixel=2,
+        halves=renderer.halves,
+        layout=renderer.layout,
     )
     config = config.copy()
     with open_dict(config):

@@ -43,14 +43,13 @@ def make(
     capacity: int = 64,
     seed: int = 0,
     renderer: AnalyticRenderer | PocketRenderer | None = None,
-    halves: bool = False,
     when_late: str = "wait",
     clock: PhaseClock | None = None,
     device: str = "cpu",
 ) -> TrainingStream:
     renderer = renderer or AnalyticRenderer(dimensions=3, patch_size=8)
     return TrainingStream(
-        samples=PatchSamples(renderer=renderer, halves=halves),
+        samples=PatchSamples(renderer=renderer),
         sampler=sampler
         or MarkovChains(
             chains=CHAINS,

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from ngi.explore import Importance, PredictedLoss
-from ngi.learn import PatchSamples, training_step
+from ngi.learn import training_step
 from ngi.learn.batch import Batch, Feedback
 from ngi.learn.noise import noise_loss, without_noise
 from ngi.models import L1Dssim, SampleLoss
@@ -21,9 +21,17 @@ from tests.learn.test_step import module
 COUNT = 200
 
 
-def renderer(noise: float) -> PocketRenderer:
+def renderer(noise: float, *, halves: bool = False) -> PocketRenderer:
+    """noise: of each half, or of the whole where there are none"""
     return PocketRenderer(
-        dimensions=3, volume=0.1, pockets=1, sharpness=0.0, patch_size=16, noise=noise
+        dimensions=3,
+        volume=0.1,
+        pockets=1,
+        sharpness=0.0,
+        patch_size=16,
+        samples_per_pixel=2 if halves else 1,
+        halves=halves,
+        noise=noise,
     )
 
 
@@ -33,11 +41,7 @@ def states() -> Tensor:
 
 def rendered(noise: float) -> tuple[Batch, Tensor]:
     """Patches traced in two halves, and the truth [n, P, P, 3]."""
-    found = (
-        PatchSamples(renderer=renderer(noise), halves=True)
-        .start_patches(states(), resolution=24, seed=3)
-        .result()
-    )
+    found = renderer(noise, halves=True).render_patches(states(), resolution=24, seed=3)
     truth = renderer(0.0).render_patches(states(), resolution=24, seed=3).log_radiance
     patches = Patches(
         scene_vector=states()[:, :-2],
@@ -75,9 +79,10 @@ def test_a_patch_is_the_mean_of_its_halves() -> None:
     assert torch.equal(batch.first_half, single.log_radiance)
     ratio = squared(batch.patches.log_radiance, truth) / squared(single.log_radiance, truth)
     assert ratio.median().item() == pytest.approx(0.5, abs=0.03)
-    halves = PatchSamples(renderer=renderer(0.2), halves=True)
-    paths = halves.start_patches(states(), resolution=24, seed=3).result().paths
-    assert paths == 2 * single.paths
+    whole = renderer(0.2, halves=True).render_patches(states(), resolution=24, seed=3)
+    assert whole.paths == 2 * single.paths
+    with pytest.raises(ValueError, match=r"samples_per_pixel is 3; renderer\.halves=true needs"):
+        AnalyticRenderer(dimensions=1, patch_size=8, samples_per_pixel=3, halves=True)
 
 
 @pytest.mark.parametrize("offset", [0.0, 0.1])
@@ -113,8 +118,10 @@ def test_a_loss_below_the_noise_is_none() -> None:
 def test_a_step_on_patches_in_two_halves_tells_their_noise(tmp_path: Path) -> None:
     """The network learns from the mean, the stream hears of the noise; stored patches have none."""
     told: list[Feedback] = []
-    small = AnalyticRenderer(dimensions=3, patch_size=8, noise=0.3)
-    stream = make(tmp_path, sampler=predicted(), rule=Epochs(), renderer=small, halves=True)
+    small = AnalyticRenderer(
+        dimensions=3, patch_size=8, samples_per_pixel=2, halves=True, noise=0.3
+    )
+    stream = make(tmp_path, sampler=predicted(), rule=Epochs(), renderer=small)
     feedback = stream.feedback
     stream.feedback = lambda given: (told.append(given), feedback(given))[1]  # type: ignore[method-assign, assignment, func-returns-value]
     learner = module(stream, tmp_path)

@@ -49,9 +49,11 @@ def test_targets_are_the_mean_of_traced_and_denoised_radiance(share) -> None:
 
 def test_of_a_denoised_patch_only_the_traced_share_is_noise() -> None:
     """What is left of (a - b) / 2 where the mean is half traced."""
-    renderer = AnalyticRenderer(dimensions=3, patch_size=16, noise=0.3)
+    renderer = AnalyticRenderer(
+        dimensions=3, patch_size=16, samples_per_pixel=2, halves=True, noise=0.3
+    )
     halves, both = (
-        PatchSamples(renderer=renderer, denoiser=denoiser, traced_share=0.5, halves=True)
+        PatchSamples(renderer=renderer, denoiser=denoiser, traced_share=0.5)
         .start_patches(states(renderer), resolution=64, seed=1)
         .result()
         for denoiser in (None, Halving())

@@ -67,6 +67,8 @@ def assert_same(a, b) -> None:
     assert torch.equal(a.buffers, b.buffers)
     assert torch.equal(a.log_radiance, b.log_radiance)
     assert (a.repaired, a.masked, a.paths) == (b.repaired, b.masked, b.paths)
+    assert (a.first_half is None) == (b.first_half is None)
+    assert a.first_half is None or torch.equal(a.first_half, b.first_half)
 
 
 def processes() -> set[int]:

@@ -214,6 +214,30 @@ def test_many_samples_are_traced_in_passes_that_weigh_by_their_samples(
     assert patches.paths == 16 * 16 * 8
 
 
+def test_a_patch_in_halves_is_the_mean_of_two_independent_ones(load_box) -> None:
+    """Each of the halves as a renderer with so many samples has it; of the same cost as one."""
+    halves = load_box("llvm", buffer_samples=1, patch_size=16, halves=True)
+    whole = load_box("llvm", buffer_samples=1, patch_size=16)
+    half = load_box("llvm", buffer_samples=1, patch_size=16, samples_per_pixel=4)
+    given = {"states": states(24), "resolution": 40, "seed": 3}
+    found, one, single = (r.render_patches(**given) for r in (halves, whole, half))
+    assert (found.paths, found.repaired, found.masked) == (one.paths, 0, 0)
+    assert torch.equal(found.buffers, one.buffers)
+    assert one.first_half is None
+    assert torch.equal(found.first_half, single.log_radiance)
+
+    seeds = [halves.render_patches(states(3), resolution=40, seed=i) for i in range(40)]
+    means, first = (
+        torch.stack([getattr(each, name).expm1() for each in seeds])
+        for name in ("log_radiance", "first_half")
+    )
+    both = torch.stack([first, 2 * means - first]).clamp(max=2)  # without fireflies
+    noise = (both - both.mean(dim=1, keepdim=True)).flatten(1)  # of each pixel, over the seeds
+    assert noise.std(dim=1).min() > 0.05
+    assert noise.std(dim=1).max() < 1.1 * noise.std(dim=1).min()
+    assert torch.corrcoef(noise.sign())[0, 1].abs() < 0.02
+
+
 @pytest.mark.parametrize(("bad_attempts", "masked"), [(1, 0), (2, 1)])
 def test_pixels_that_are_not_finite(load_box, monkeypatch, bad_attempts, masked) -> None:
     renderer = load_box("llvm", buffer_samples=1, patch_size=16)
@@ -234,6 +258,26 @@ def test_pixels_that_are_not_finite(load_box, monkeypatch, bad_attempts, masked)
     assert len(set(calls)) == 2
     assert torch.isfinite(patches.log_radiance).all()
     assert bool((patches.log_radiance[0, 3, 4] == 0).all()) == bool(masked)
+
+
+def test_a_pixel_that_is_not_finite_in_one_half_is_none_in_both(load_box, monkeypatch) -> None:
+    renderer = load_box("llvm", buffer_samples=1, patch_size=16, halves=True)
+    radiance, calls = renderer._tracer.radiance, []
+
+    def broken(window, **arguments):
+        calls.append(arguments["seed"])
+        image = radiance(window, **arguments)().clone()
+        if len(calls) % 2 == 0:  # the second half, at both attempts
+            image[3, 4, 1] = np.nan
+        return lambda: image
+
+    monkeypatch.setattr(renderer._tracer, "radiance", broken)
+    patches = renderer.render_patches(states(1), resolution=40, seed=0)
+    assert (patches.repaired, patches.masked, len(set(calls))) == (1, 1, 4)
+    for each in (patches.log_radiance, patches.first_half):
+        assert torch.isfinite(each).all()
+        assert (each[0, 3, 4] == 0).all()
+        assert (each[0, 3, 5] > 0).all()
 
 
 def test_only_the_patch_that_is_not_finite_is_rendered_again(load_box, monkeypatch) -> None:
@@ -317,6 +361,10 @@ def test_bad_states(renderer, bad, resolution, message) -> None:
 def test_bad_construction(box_folder, tmp_path) -> None:
     with pytest.raises(ValueError, match="patch_size is 0"):
         MitsubaRenderer(scene=read_scene(box_folder), backend="scalar", patch_size=0)
+    with pytest.raises(ValueError, match=r"samples_per_pixel is 7; renderer\.halves=true needs an"):
+        MitsubaRenderer(
+            scene=read_scene(box_folder), backend="scalar", samples_per_pixel=7, halves=True
+        )
     with pytest.raises(ValueError, match="backend 'metal': choose one of"):
         MitsubaRenderer(scene=read_scene(box_folder), backend="metal")
     shutil.copytree(box_folder, tmp_path, dirs_exist_ok=True)

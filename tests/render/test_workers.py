@@ -231,6 +231,7 @@ def test_mitsuba_in_another_process_gives_the_same() -> None:
         "backend": "llvm",
         "patch_size": 16,
         "samples_per_pixel": 8,
+        "halves": True,
     }
     alone = mitsuba_renderer(workers=0, cluster=None, **options)
     assert type(alone) is MitsubaRenderer
@@ -241,6 +242,7 @@ def test_mitsuba_in_another_process_gives_the_same() -> None:
                 r.render_patches(given, resolution=resolution, seed=3) for r in (alone, renderer)
             ]
             assert_same(*results)
+            assert results[0].first_half is not None
 
 
 def test_the_configuration_is_checked(monkeypatch) -> None:

@@ -55,9 +55,10 @@ def plain_configuration(method: Method, plan: Plan) -> dict[str, Any]:
 
 
 @lru_cache(maxsize=1)
-def _scene(setting: Setting, frames: int) -> tuple[PocketRenderer, TestSet]:
-    renderer = instantiate(configuration(Method("uniform", reuse=False)).renderer, **setting.scene)
-    return renderer, TestSet(renderer, frames=frames)
+def _scene(setting: Setting, plan: Plan) -> tuple[PocketRenderer, TestSet]:
+    config = configuration(Method("uniform", reuse=False), plan.learner)
+    renderer = instantiate(config.renderer, **setting.scene)
+    return renderer, TestSet(renderer, frames=plan.frames)
 
 
 def train(setting: Setting, method: Method, seed: int, plan: Plan) -> Iterator[dict[str, Any]]:
@@ -70,7 +71,7 @@ def train(setting: Setting, method: Method, seed: int, plan: Plan) -> Iterator[d
     """
     config = configuration(method, plan.learner, plan.reuse).copy()
     config.seed, config.model.hidden_features = seed, setting.hidden_features
-    renderer, test_set = _scene(setting, plan.frames)
+    renderer, test_set = _scene(setting, plan)
     clock = learn.PhaseClock()
     samples = build_samples(config, renderer=renderer)
     stream = build_stream(config, samples=samples, clock=clock, patches=Path())  # not written

@@ -95,7 +95,7 @@ def test_the_long_plan_reuses_as_ours_does_and_knows_the_noise() -> None:
         made = training.plain_configuration(method, plan)
         policy = "FixedProbability" if method.reuse else "Never"
         assert made["reuse"]["policy"]["_target_"].endswith(policy)
-        assert made["data"]["halves"] is True
+        assert made["renderer"]["halves"] is True
     (last,) = rows(Method("predicted", reuse=True), plan=replace(plan, steps=12, evaluations=1))
     assert last["generated_batches"] < 12
 
