@@ -15,7 +15,7 @@ EXPLORING = {
     "ours_loss_target": "mcmc_loss",
     "ours_metropolis": "mcmc_metropolis",
 }
-OURS = ("ours", "ours_uniform", *EXPLORING)
+OURS = ("ours", "ours_uniform", "ours_predicted", *EXPLORING)
 LIGHT = ["specular", "direct and caustics"]
 METHODS = {  # sampler, resolution, model, what the renderer traces into the buffers
     "active_exploration": ("mcmc_loss_step", "growing", PRECONDITIONED, []),
@@ -35,6 +35,7 @@ METHODS = {  # sampler, resolution, model, what the renderer traces into the buf
     "traced_specular": ("mcmc_loss_step", "growing", PRECONDITIONED, ["specular"]),
     "ours": ("sobol", "constant", "encoded_generator", LIGHT),
     "ours_uniform": ("uniform", "constant", "encoded_generator", LIGHT),
+    "ours_predicted": ("predicted_loss", "constant", "encoded_generator", LIGHT),
     **{
         method: (sampler, "constant", "encoded_generator", LIGHT)
         for method, sampler in EXPLORING.items()
@@ -78,6 +79,7 @@ def test_a_method_differs_where_its_name_says_and_nowhere_else(method: str) -> N
     found = (chosen.sampler, chosen.resolution, chosen.model, traced)
     assert found == METHODS[method]
     assert config.label.method == method
+    assert config.renderer.halves == (chosen.sampler == "predicted_loss")
     other = composed("budget=small")
     if method == "fixed_data":
         other.reuse = composed("budget=small", "reuse=epochs").reuse

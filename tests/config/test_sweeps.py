@@ -12,7 +12,16 @@ from tests.config.command_line import composed
 
 BUDGETS = ("smoke", "small", "paper")
 SWEEPS = [file.stem for file in sorted((root() / "sweeps").glob("*.yaml"))]
-OF_ONE_SIZE = ("demo", "learner", "minute", "needed", "ours_hour", "smoke", "stability")
+OF_ONE_SIZE = (
+    "demo",
+    "learner",
+    "minute",
+    "needed",
+    "ours_hour",
+    "ours_predicted",
+    "smoke",
+    "stability",
+)
 """Sweeps that are no table or figure of the paper."""
 
 
