@@ -31,6 +31,7 @@ def keys(*overrides: str, dimensions: int = 3) -> dict[str, str]:
         dimensions=dimensions,
         patch_size=config.renderer.patch_size,
         samples_per_pixel=config.renderer.get("samples_per_pixel", 1),
+        halves=config.renderer.get("halves", False),
     )
     return {part.name: part.key for part in run_components(config, renderer=renderer)}
 
@@ -100,6 +101,13 @@ def test_methods_share_what_they_have_in_common() -> None:
 def test_a_cost_is_known_by_what_it_depends_on(override: str, changed: set[str]) -> None:
     before, after = keys(), keys(override)
     assert {name for name in before if before[name] != after[name]} == changed
+
+
+def test_halves_have_costs_of_their_own_and_without_them_all_is_called_as_before() -> None:
+    even = "+renderer.samples_per_pixel=2"
+    whole, halves = keys(even), keys(even, "+renderer.halves=true")
+    assert keys(even, "+renderer.halves=false") == whole
+    assert not {*whole.values()} & {*halves.values()}
 
 
 def test_how_fast_and_how_far_back_is_no_question_of_cost() -> None:
