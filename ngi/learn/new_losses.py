@@ -5,21 +5,29 @@ import math
 import torch
 from torch import Tensor
 
+from ngi.learn.noise import without_noise
+
 REMEMBERED = 1024
 
 
 class NewLosses:
     """The losses of the newest patches, at most `REMEMBERED`, each before it was trained on.
 
-    Without noise, where that is known (`ngi.learn.noise`).
+    Without noise, where that is known.
     """
 
     def __init__(self) -> None:
         self._losses = torch.zeros(0)
 
-    def add(self, losses: Tensor) -> None:
-        """[n], on the CPU; those that are NaN or infinite are left out."""
+    def add(self, losses: Tensor, noise: Tensor | None) -> Tensor:
+        """Remembers those of [n] that are neither NaN nor infinite; gives all, without noise.
+
+        noise: [n], as from `ngi.learn.noise.noise_loss`, or None
+        """
+        if noise is not None:
+            losses = without_noise(losses, noise)
         self._losses = torch.cat([self._losses, losses[losses.isfinite()]])[-REMEMBERED:]
+        return losses
 
     @property
     def worst_share(self) -> float:
@@ -29,11 +37,11 @@ class NewLosses:
         """
         return worst_share(self._losses[len(self._losses) // 2 :])
 
-    def state_dict(self) -> Tensor:
-        return self._losses
+    def state_dict(self) -> list[float]:
+        return self._losses.tolist()
 
-    def load_state_dict(self, state: Tensor) -> None:
-        self._losses = state
+    def load_state_dict(self, state: list[float]) -> None:
+        self._losses = torch.tensor(state)
 
 
 def worst_share(losses: Tensor) -> float:

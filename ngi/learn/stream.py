@@ -23,7 +23,6 @@ from ngi.learn.ahead import ProposalsAhead
 from ngi.learn.batch import Batch, Feedback
 from ngi.learn.chain_trace import chain_record, chain_row
 from ngi.learn.new_losses import NewLosses
-from ngi.learn.noise import without_noise
 from ngi.learn.samples import Samples
 from ngi.learn.saved_stores import SavedStores
 from ngi.reuse import Reuse
@@ -280,10 +279,6 @@ class TrainingStream:
 
     def _accept(self, batch: Batch, feedback: Feedback) -> None:
         assert self._ahead is not None
-        losses = feedback.losses.detach().float().cpu()
-        if feedback.noise is not None:
-            losses = without_noise(losses, feedback.noise)
-        self.new_losses.add(losses)
         unscored = torch.zeros(self.sampler.chains)  # looked at by no rule
         proposed, current = feedback.target_proposed, feedback.target_current
         self.chains, self._chain_info = self.sampler.accept(
@@ -293,7 +288,7 @@ class TrainingStream:
             target_current=unscored if current is None else current,
             target_proposed=unscored if proposed is None else proposed,
             generator=self._generator,
-            losses=losses,
+            losses=self.new_losses.add(feedback.losses.detach().float().cpu(), feedback.noise),
         )
         self.chain_record = chain_record(
             self._ahead.proposals,

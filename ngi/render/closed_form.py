@@ -20,7 +20,7 @@ class ClosedFormRenderer(Renderer):
     Everything is evaluated at pixel centres, so that a patch equals the same pixels of the image.
 
     dimensions: D, at least 1. patch_size: P. samples_per_pixel: only scales the noise.
-    halves: see `MitsubaRenderer`.
+    halves: see `ngi.render.mitsuba_renderer.HalvesRenderer`.
     noise: relative standard deviation of the radiance at one sample per pixel, 0 for none.
     layout: which buffers there are.
     formula: name, version and numbers of the formula, for the scene's hash.

@@ -49,7 +49,6 @@ class MitsubaRenderer(Renderer):
     backend: 'auto', 'cuda', 'llvm' or 'scalar', see `ngi.machine.backend.activate`.
     patch_size: P, pixels along a patch's side.
     samples_per_pixel: of training patches; the scene's own number where None.
-    halves: patches tell by how much the first half of their samples is off, see `RenderedPatches`.
     buffer_samples: rays per pixel of the buffers; `BUFFER_SAMPLES` where None.
     specular: 'learned': the buffers are those of the first hit; 'traced': of the first hit that is
         not specular (paper, Fig. 10), see `ngi.render.specular`.
@@ -73,7 +72,6 @@ class MitsubaRenderer(Renderer):
         backend: str = "auto",
         patch_size: int = 32,
         samples_per_pixel: int | None = None,
-        halves: bool = False,
         buffer_samples: int | None = None,
         specular: str = "learned",
         direct: str = "learned",
@@ -110,8 +108,7 @@ class MitsubaRenderer(Renderer):
         self.dimensions = scene.dimensions
         self.patch_size = patch_size
         self.samples_per_pixel = samples_per_pixel or scene.samples_per_pixel
-        self.halves = halves
-        of_each = halved(self.samples_per_pixel) if halves else self.samples_per_pixel
+        of_each = halved(self.samples_per_pixel) if self.halves else self.samples_per_pixel
         self._passes = passes(of_each, patch_size**2)
         self.moving_points = moving_points(self._scene)
         self.camera_part = scene.camera_part
@@ -269,6 +266,14 @@ class MitsubaRenderer(Renderer):
                 f"{path}: the film is {width} x {height}; make width and height equal, since the "
                 "virtual image is a square"
             )
+
+
+class HalvesRenderer(MitsubaRenderer):
+    """The same, whose patches have a `RenderedPatches.first_half`.
+
+    Raises ValueError besides for an odd number of samples per pixel."""
+
+    halves = True
 
 
 def _tracer(variant: str, scene: VariableScene, first_hit: FirstHit) -> Tracer:

@@ -50,6 +50,7 @@ class PocketRenderer(ClosedFormRenderer):
 
     volume: in (0, 0.5]. pockets: at least 1. sharpness: in [0, 1]; 1 switches effects on and off
     at the border. active: A, from 1 to D; None for 4, or D where that is less.
+    halves: patches are the mean of two samples.
     Other arguments are those of `ClosedFormRenderer`; the buffers are position and albedo.
     Raises ValueError for numbers out of range.
     """
@@ -63,7 +64,6 @@ class PocketRenderer(ClosedFormRenderer):
         sharpness: float,
         patch_size: int,
         active: int | None = None,
-        samples_per_pixel: int = 1,
         halves: bool = False,
         noise: float = 0.0,
     ) -> None:
@@ -72,7 +72,7 @@ class PocketRenderer(ClosedFormRenderer):
         super().__init__(
             dimensions=dimensions,
             patch_size=patch_size,
-            samples_per_pixel=samples_per_pixel,
+            samples_per_pixel=2 if halves else 1,
             halves=halves,
             noise=noise,
             layout=layout,

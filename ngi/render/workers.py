@@ -16,24 +16,28 @@ from ngi.render.worker_process import WorkerProcess
 from ngi.render.worker_protocol import Request, Worker
 
 
-def mitsuba_renderer(*, workers: int, cluster: str | None, **options: Any) -> Renderer:
+def mitsuba_renderer(
+    *, workers: int, cluster: str | None, halves: bool = False, **options: Any
+) -> Renderer:
     """The `MitsubaRenderer` with these options, or workers that have one each.
 
+    halves: the `HalvesRenderer` instead
     workers, cluster: see `WorkerRenderer`; 0 workers: everything is rendered in this process.
     Raises ValueError for a cluster without workers, and what `MitsubaRenderer` and
     `WorkerRenderer` raise.
     """
     from ngi.machine.backend import VARIANTS, activate
-    from ngi.render.mitsuba_renderer import MitsubaRenderer
+    from ngi.render.mitsuba_renderer import HalvesRenderer, MitsubaRenderer
 
+    kind = HalvesRenderer if halves else MitsubaRenderer
     if workers == 0 and cluster is not None:
         raise ValueError(f"renderer.cluster '{cluster}' needs workers; set renderer.workers")
     if workers == 0:
-        return MitsubaRenderer(**options)
+        return kind(**options)
     variant = activate(options.pop("backend"))  # 'auto' must not come out differently in a worker
     backend = next(name for name in VARIANTS if VARIANTS[name] == variant)
     return WorkerRenderer(
-        partial(MitsubaRenderer, backend=backend, **options), workers=workers, cluster=cluster
+        partial(kind, backend=backend, **options), workers=workers, cluster=cluster
     )
 
 

@@ -29,8 +29,8 @@ def test_the_newer_half_of_what_is_remembered_counts() -> None:
     losses = np.random.default_rng(3).lognormal(size=1500).astype(np.float32)
     losses[REMEMBERED // 2 : 600] = 1000  # of an untrained network, old by now
     for part in np.array_split(losses, 100):
-        found.add(torch.from_numpy(part))
-        found.add(torch.tensor([math.nan, math.inf]))
+        found.add(torch.from_numpy(part), None)
+        found.add(torch.tensor([math.nan, math.inf]), None)
     newest = np.sort(losses[-REMEMBERED // 2 :])
     expected = newest[-math.ceil(0.05 * len(newest)) :].sum() / newest.sum()
     assert found.worst_share == pytest.approx(expected, rel=1e-5)

@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 from ngi.machine.backend import llvm_problem
-from ngi.render.mitsuba_renderer import MitsubaRenderer
+from ngi.render.mitsuba_renderer import HalvesRenderer, MitsubaRenderer
 from ngi.scene import read_scene
 from tests.render.optics import write_scene
 from tests.render.specular_scenes import COLOURS, PAINT
@@ -34,7 +34,8 @@ def load_box() -> Callable[..., MitsubaRenderer]:
             pytest.skip(problem)
         key = (backend, *sorted(arguments.items()))
         if key not in loaded:
-            loaded[key] = MitsubaRenderer(scene=read_scene(BOX), backend=backend, **arguments)
+            kind = HalvesRenderer if arguments.pop("halves", False) else MitsubaRenderer
+            loaded[key] = kind(scene=read_scene(BOX), backend=backend, **arguments)
         return loaded[key]
 
     return load

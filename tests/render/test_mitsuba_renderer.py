@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from ngi.machine.backend import dr, mi
-from ngi.render.mitsuba_renderer import MitsubaRenderer
+from ngi.render.mitsuba_renderer import HalvesRenderer, MitsubaRenderer
 from ngi.scene import read_scene
 from ngi.scene.variable_scene import VariableScene
 
@@ -362,9 +362,7 @@ def test_bad_construction(box_folder, tmp_path) -> None:
     with pytest.raises(ValueError, match="patch_size is 0"):
         MitsubaRenderer(scene=read_scene(box_folder), backend="scalar", patch_size=0)
     with pytest.raises(ValueError, match=r"samples_per_pixel is 7; renderer\.halves=true needs an"):
-        MitsubaRenderer(
-            scene=read_scene(box_folder), backend="scalar", samples_per_pixel=7, halves=True
-        )
+        HalvesRenderer(scene=read_scene(box_folder), backend="scalar", samples_per_pixel=7)
     with pytest.raises(ValueError, match="backend 'metal': choose one of"):
         MitsubaRenderer(scene=read_scene(box_folder), backend="metal")
     shutil.copytree(box_folder, tmp_path, dirs_exist_ok=True)

@@ -17,7 +17,7 @@ from omegaconf import open_dict
 from ngi.config.configuration import run_settings
 from ngi.machine.backend import llvm_problem
 from ngi.render import watchdog
-from ngi.render.mitsuba_renderer import MitsubaRenderer
+from ngi.render.mitsuba_renderer import HalvesRenderer
 from ngi.render.worker_process import WorkerProcess, visible_gpus
 from ngi.render.worker_protocol import Request
 from ngi.render.workers import WorkerRenderer, mitsuba_renderer
@@ -234,7 +234,7 @@ def test_mitsuba_in_another_process_gives_the_same() -> None:
         "halves": True,
     }
     alone = mitsuba_renderer(workers=0, cluster=None, **options)
-    assert type(alone) is MitsubaRenderer
+    assert type(alone) is HalvesRenderer
     given = torch.rand(6, 4, generator=torch.Generator().manual_seed(0))
     with mitsuba_renderer(workers=1, cluster=None, **options) as renderer:
         for resolution in (32, 48):

@@ -54,7 +54,7 @@ def test_it_is_measured_on_the_same_frames_by_the_same_references(runs: Path) ->
     assert network.keys() - few.keys() <= {
         *("energy_joules", "energy_sources", "wall_seconds_by_phase", "non_finite_losses"),
         *("generated_batches", "scored_batches", "patches_repaired", "patches_masked"),
-        *("batches_refused", "steps_refused", "steps_scaled"),
+        *("batches_refused", "steps_refused", "steps_scaled", "new_worst_share"),
     }
     assert few["steps"] == few["paths_traced"] == few["run_seconds"] == 0
     assert few["label"]["method"] == "path_tracing_8spp"
