@@ -269,9 +269,7 @@ class MitsubaRenderer(Renderer):
 
 
 class HalvesRenderer(MitsubaRenderer):
-    """The same, whose patches have a `RenderedPatches.first_half`.
-
-    Raises ValueError besides for an odd number of samples per pixel."""
+    """Patches have `RenderedPatches.first_half`; ValueError for an odd number of samples."""
 
     halves = True
 
