@@ -36,11 +36,11 @@ class ClosedFormRenderer(Renderer):
         *,
         dimensions: int,
         patch_size: int,
-        samples_per_pixel: int,
-        halves: bool,
-        noise: float,
         layout: BufferLayout,
         formula: tuple[object, ...],
+        samples_per_pixel: int = 1,
+        halves: bool = False,
+        noise: float = 0.0,
     ) -> None:
         require_positive(
             dimensions=dimensions, patch_size=patch_size, samples_per_pixel=samples_per_pixel

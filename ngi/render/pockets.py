@@ -1,6 +1,7 @@
 """Closed formulas with rare effects: a family of scenes in which everything rare has a knob."""
 
 from math import pi, sqrt
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -50,8 +51,8 @@ class PocketRenderer(ClosedFormRenderer):
 
     volume: in (0, 0.5]. pockets: at least 1. sharpness: in [0, 1]; 1 switches effects on and off
     at the border. active: A, from 1 to D; None for 4, or D where that is less.
-    halves: patches are the mean of two samples.
-    Other arguments are those of `ClosedFormRenderer`; the buffers are position and albedo.
+    sampling: samples_per_pixel, halves, noise; they and other arguments are those of
+    `ClosedFormRenderer`. The buffers are position and albedo.
     Raises ValueError for numbers out of range.
     """
 
@@ -64,17 +65,14 @@ class PocketRenderer(ClosedFormRenderer):
         sharpness: float,
         patch_size: int,
         active: int | None = None,
-        halves: bool = False,
-        noise: float = 0.0,
+        **sampling: Any,
     ) -> None:
         active = min(dimensions, MOST_ACTIVE) if active is None else active
         layout = BufferLayout(("position", "albedo"))
         super().__init__(
             dimensions=dimensions,
             patch_size=patch_size,
-            samples_per_pixel=2 if halves else 1,
-            halves=halves,
-            noise=noise,
+            **sampling,
             layout=layout,
             formula=("pockets", FORMULA_VERSION, volume, pockets, float(sharpness), active),
         )

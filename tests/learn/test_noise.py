@@ -29,6 +29,7 @@ def renderer(noise: float, *, halves: bool = False) -> PocketRenderer:
         pockets=1,
         sharpness=0.0,
         patch_size=16,
+        samples_per_pixel=2 if halves else 1,
         halves=halves,
         noise=noise,
     )

@@ -68,7 +68,7 @@ OUR_LEARNER = ("optimizer=muon", "schedule=warmup_stable_decay", "averaging=expo
 """Of `method=ours`, all that does not concern the samples or what the network sees of them."""
 
 
-NOISE_KNOWN = "renderer.halves=true"
+NOISE_KNOWN = ("renderer.halves=true", "renderer.samples_per_pixel=2")
 """Each patch is the mean of two samples: predictions are made of losses without its noise."""
 
 
@@ -88,7 +88,7 @@ OURS_LONG = Plan(
     evaluations=40,
     frames=400,
     methods=OURS,
-    learner=(*OUR_LEARNER, NOISE_KNOWN),
+    learner=(*OUR_LEARNER, *NOISE_KNOWN),
     reuse=STEADY,
 )
 
