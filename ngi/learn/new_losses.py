@@ -5,6 +5,7 @@ import math
 import torch
 from torch import Tensor
 
+from ngi.evaluate.evaluation import WORST_OF
 from ngi.learn.noise import without_noise
 
 REMEMBERED = 1024
@@ -50,5 +51,9 @@ def worst_share(losses: Tensor) -> float:
     0.05 where all are equal; NaN where there are none, and where all are 0.
     """
     losses = losses.double()
-    worst = losses.topk(math.ceil(len(losses) / 20)).values
-    return (worst.sum() / losses.sum()).item()
+    return (worst(losses).sum() / losses.sum()).item()
+
+
+def worst(values: Tensor) -> Tensor:
+    """The largest 5 % of [n], rounded up to whole ones."""
+    return values.topk(math.ceil(len(values) / WORST_OF)).values

@@ -1,6 +1,7 @@
 """A renderer made of closed formulas, which tests the whole pipeline in seconds."""
 
 from math import pi, sqrt
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -27,7 +28,8 @@ class AnalyticRenderer(ClosedFormRenderer):
 
         radiance(p) = albedo(v) * (AMBIENT + SPOT * exp(-|p - c(v)|^2 / (2 r(v)^2))) + lamp(p)
 
-    Its arguments are those of `ClosedFormRenderer`, by default all buffers and no noise.
+    sampling: samples_per_pixel, halves, noise; they and the other arguments are those of
+    `ClosedFormRenderer`. By default there are all buffers.
     """
 
     def __init__(
@@ -35,17 +37,13 @@ class AnalyticRenderer(ClosedFormRenderer):
         *,
         dimensions: int,
         patch_size: int,
-        samples_per_pixel: int = 1,
-        halves: bool = False,
-        noise: float = 0.0,
         layout: BufferLayout | None = None,
+        **sampling: Any,
     ) -> None:
         super().__init__(
             dimensions=dimensions,
             patch_size=patch_size,
-            samples_per_pixel=samples_per_pixel,
-            halves=halves,
-            noise=noise,
+            **sampling,
             layout=layout or BufferLayout(),
             formula=("analytic", FORMULA_VERSION),
         )

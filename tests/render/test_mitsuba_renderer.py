@@ -10,12 +10,7 @@ from ngi.machine.backend import dr, mi
 from ngi.render.mitsuba_renderer import HalvesRenderer, MitsubaRenderer
 from ngi.scene import read_scene
 from ngi.scene.variable_scene import VariableScene
-
-V = torch.tensor([0.2, 0.9, 0.4, 0.8, 0.4, 0.3, 0.3, 0.6, 0.25, 0.6])
-
-
-def states(n, seed=0):
-    return torch.rand(n, 12, generator=torch.Generator().manual_seed(seed))
+from tests.render.box import V, states
 
 
 def z_scores(a, b):
@@ -155,27 +150,6 @@ def test_buffers_of_an_image_are_the_same_in_bands(load_box, monkeypatch) -> Non
     assert [window.height for window in windows] == [5, 5, 5, 1]
 
 
-def test_pixels_of_an_image_that_are_not_finite_stay_so(load_box, monkeypatch) -> None:
-    renderer = load_box("llvm", buffer_samples=1, patch_size=16)
-    clean = renderer.render_image(V, resolution=16, samples_per_pixel=8, seed=0)
-    radiance = renderer._tracer.radiance
-    calls = []
-
-    def broken(window, **arguments):
-        calls.append(arguments["seed"])
-        image = radiance(window, **arguments)().clone()
-        image[3, 4, 1] = np.nan
-        image[5, 6] = np.inf
-        return lambda: image
-
-    monkeypatch.setattr(renderer._tracer, "radiance", broken)
-    image = renderer.render_image(V, resolution=16, samples_per_pixel=8, seed=0)
-    assert len(calls) == 1
-    assert (~image.isfinite()).nonzero().tolist() == [[3, 4, 1], *([5, 6, i] for i in range(3))]
-    finite = image.isfinite()
-    assert torch.equal(image[finite], clean[finite])
-
-
 def test_scalar_images_follow_the_camera(box_folder) -> None:
     renderer = MitsubaRenderer(
         scene=read_scene(box_folder), backend="scalar", buffer_samples=1, patch_size=16
@@ -236,72 +210,6 @@ def test_a_patch_in_halves_is_the_mean_of_two_independent_ones(load_box) -> None
     assert noise.std(dim=1).min() > 0.05
     assert noise.std(dim=1).max() < 1.1 * noise.std(dim=1).min()
     assert torch.corrcoef(noise.sign())[0, 1].abs() < 0.02
-
-
-@pytest.mark.parametrize(("bad_attempts", "masked"), [(1, 0), (2, 1)])
-def test_pixels_that_are_not_finite(load_box, monkeypatch, bad_attempts, masked) -> None:
-    renderer = load_box("llvm", buffer_samples=1, patch_size=16)
-    radiance = renderer._tracer.radiance
-    calls = []
-
-    def broken(window, **arguments):
-        calls.append(arguments["seed"])
-        image = radiance(window, **arguments)().clone()
-        if len(calls) <= bad_attempts:
-            image[3, 4, 1] = np.nan
-        return lambda: image
-
-    monkeypatch.setattr(renderer._tracer, "radiance", broken)
-    patches = renderer.render_patches(states(1), resolution=40, seed=0)
-    assert (patches.repaired, patches.masked) == (1, masked)
-    assert patches.paths == 2 * 16 * 16 * 8
-    assert len(set(calls)) == 2
-    assert torch.isfinite(patches.log_radiance).all()
-    assert bool((patches.log_radiance[0, 3, 4] == 0).all()) == bool(masked)
-
-
-def test_a_pixel_that_is_not_finite_in_one_half_is_none_in_both(load_box, monkeypatch) -> None:
-    renderer = load_box("llvm", buffer_samples=1, patch_size=16, halves=True)
-    radiance, calls = renderer._tracer.radiance, []
-
-    def broken(window, **arguments):
-        calls.append(arguments["seed"])
-        image = radiance(window, **arguments)().clone()
-        if len(calls) % 2 == 0:  # the second half, at both attempts
-            image[3, 4, 1] = np.nan
-        return lambda: image
-
-    monkeypatch.setattr(renderer._tracer, "radiance", broken)
-    patches = renderer.render_patches(states(1), resolution=40, seed=0)
-    assert (patches.repaired, patches.masked, len(set(calls))) == (1, 1, 4)
-    for each in (patches.log_radiance, patches.first_half):
-        assert torch.isfinite(each).all()
-        assert (each[0, 3, 4] == 0).all()
-        assert (each[0, 3, 5] > 0).all()
-
-
-def test_only_the_patch_that_is_not_finite_is_rendered_again(load_box, monkeypatch) -> None:
-    renderer = load_box("llvm", buffer_samples=1, patch_size=16)
-    whole = renderer.render_patches(states(4), resolution=40, seed=0)
-    radiance = renderer._tracer.radiance
-    seeds = []
-
-    def broken(window, *, samples, seed):
-        seeds.append(seed)
-        image = radiance(window, samples=samples, seed=seed)().clone()
-        if len(seeds) == 3:
-            image[0, 0, 0] = np.inf
-        return lambda: image
-
-    monkeypatch.setattr(renderer._tracer, "radiance", broken)
-    patches = renderer.render_patches(states(4), resolution=40, seed=0)
-    assert (patches.repaired, patches.masked, len(set(seeds))) == (1, 0, 5)
-    same = [
-        torch.equal(a, b) for a, b in zip(patches.log_radiance, whole.log_radiance, strict=True)
-    ]
-    assert same == [True, True, False, True]
-    assert torch.isfinite(patches.log_radiance).all()
-    assert torch.equal(patches.buffers, whole.buffers)
 
 
 @pytest.mark.parametrize("backend", ["llvm", "scalar"])

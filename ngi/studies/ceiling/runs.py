@@ -11,13 +11,10 @@ from torch import Tensor
 
 from ngi.evaluate import METRICS, SETS, Evaluation, Evaluator
 from ngi.explore import Importance
-from ngi.learn.new_losses import worst_share
+from ngi.learn.new_losses import worst, worst_share
 from ngi.reuse import CompactPatches
 from ngi.studies.ceiling.pool import chosen
 from ngi.studies.ceiling.training import Training
-
-TAIL = 0.05
-"""Part of a set's pixels, or of patches, those of the largest error, that make its tail."""
 
 CHUNK = 512
 """Candidates that the network is asked about at once."""
@@ -133,7 +130,7 @@ def _tail(evaluation: Evaluation, name: str) -> float:
             if each.frame.set == name
         ]
     )
-    return errors.topk(math.ceil(TAIL * len(errors))).values.mean().item()
+    return worst(errors).mean().item()
 
 
 def _part(whole: int, number: int, parts: int) -> int:

@@ -1,0 +1,9 @@
+"""Of the scene `load_box`: a configuration, and states of patches."""
+
+import torch
+
+V = torch.tensor([0.2, 0.9, 0.4, 0.8, 0.4, 0.3, 0.3, 0.6, 0.25, 0.6])
+
+
+def states(n, seed=0):
+    return torch.rand(n, 12, generator=torch.Generator().manual_seed(seed))
