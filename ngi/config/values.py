@@ -5,7 +5,7 @@ import math
 from collections.abc import Callable, Iterator
 from pkgutil import resolve_name
 from types import NoneType, UnionType
-from typing import Any, Union, get_args, get_origin, get_type_hints
+from typing import Any, Union, Unpack, get_args, get_origin, get_type_hints
 
 from omegaconf import DictConfig
 
@@ -77,9 +77,12 @@ def _target(name: str, key: str) -> Callable[..., Any]:
 def _hints(target: Callable[..., Any]) -> dict[str, Any]:
     function = target.__init__ if inspect.isclass(target) else target
     try:
-        return get_type_hints(function)
+        hints = get_type_hints(function)
     except (NameError, TypeError):  # imported for the type checker only
         return {}
+    for hint in [hint for hint in hints.values() if get_origin(hint) is Unpack]:
+        hints |= get_type_hints(get_args(hint)[0])
+    return hints
 
 
 def _fits(value: object, kind: type) -> bool:

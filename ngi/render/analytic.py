@@ -1,13 +1,13 @@
 """A renderer made of closed formulas, which tests the whole pipeline in seconds."""
 
 from math import pi, sqrt
-from typing import Any
+from typing import Unpack
 
 import torch
 from torch import Tensor
 
 from ngi.patches import BufferLayout
-from ngi.render.closed_form import ClosedFormRenderer, spread_points, spread_weights
+from ngi.render.closed_form import ClosedFormRenderer, Sampling, spread_points, spread_weights
 
 FORMULA_VERSION = 1
 """Counts changes of what the formulas give; part of the scene's hash."""
@@ -38,7 +38,7 @@ class AnalyticRenderer(ClosedFormRenderer):
         dimensions: int,
         patch_size: int,
         layout: BufferLayout | None = None,
-        **sampling: Any,
+        **sampling: Unpack[Sampling],
     ) -> None:
         super().__init__(
             dimensions=dimensions,

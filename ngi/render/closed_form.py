@@ -3,6 +3,7 @@
 from abc import abstractmethod
 from hashlib import sha256
 from math import sqrt
+from typing import TypedDict
 
 import torch
 from torch import Tensor
@@ -12,6 +13,14 @@ from ngi.render.protocol import RenderedPatches, Renderer
 from ngi.render.tracing import check_states, derive_seed, halved, patch_window, require_positive
 
 GOLDEN_RATIO = (1 + sqrt(5)) / 2
+
+
+class Sampling(TypedDict, total=False):
+    """Arguments of `ClosedFormRenderer` that all formulas have in common."""
+
+    samples_per_pixel: int
+    halves: bool
+    noise: float
 
 
 class ClosedFormRenderer(Renderer):

@@ -1,13 +1,13 @@
 """Closed formulas with rare effects: a family of scenes in which everything rare has a knob."""
 
 from math import pi, sqrt
-from typing import Any
+from typing import Unpack
 
 import torch
 from torch import Tensor
 
 from ngi.patches import BufferLayout
-from ngi.render.closed_form import ClosedFormRenderer, spread_points, spread_weights
+from ngi.render.closed_form import ClosedFormRenderer, Sampling, spread_points, spread_weights
 
 FORMULA_VERSION = 1
 """Counts changes of what the formulas give; part of the scene's hash."""
@@ -65,7 +65,7 @@ class PocketRenderer(ClosedFormRenderer):
         sharpness: float,
         patch_size: int,
         active: int | None = None,
-        **sampling: Any,
+        **sampling: Unpack[Sampling],
     ) -> None:
         active = min(dimensions, MOST_ACTIVE) if active is None else active
         layout = BufferLayout(("position", "albedo"))
