@@ -31,12 +31,13 @@ class NewLosses:
         return losses
 
     @property
-    def worst_share(self) -> float:
-        """Of the newer half of them, see `worst_share`; NaN before there are any.
+    def worst_share(self) -> float | None:
+        """Of the newer half of them, see `worst_share`; None where there are none, or all are 0.
 
         The older half may be that of a network which had not learnt anything yet.
         """
-        return worst_share(self._losses[len(self._losses) // 2 :])
+        newer = self._losses[len(self._losses) // 2 :]
+        return worst_share(newer) if newer.any() else None
 
     def state_dict(self) -> list[float]:
         return self._losses.tolist()

@@ -25,7 +25,9 @@ def test_exponential_losses_have_the_share_that_the_integral_says() -> None:
 
 def test_the_newer_half_of_what_is_remembered_counts() -> None:
     found = NewLosses()
-    assert math.isnan(found.worst_share)
+    assert found.worst_share is None
+    found.add(torch.zeros(40), None)
+    assert found.worst_share is None
     losses = np.random.default_rng(3).lognormal(size=1500).astype(np.float32)
     losses[REMEMBERED // 2 : 600] = 1000  # of an untrained network, old by now
     for part in np.array_split(losses, 100):
