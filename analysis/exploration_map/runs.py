@@ -55,10 +55,11 @@ SAMPLERS = {
         for rule in ("greedy", "metropolis")
     },
     "predicted": "predicted loss",
+    "eager": "predicted loss, eager",
 }
 """Every sampler that explores, and its name."""
 
-SCORING = {"loss": 0.35, "output_gradient": 0.4, "loss_step": 1.4, "predicted": 0.17}
+SCORING = {"loss": 0.35, "output_gradient": 0.4, "loss_step": 1.4, "predicted": 0.17, "eager": 0.17}
 """What scoring 16 proposals and 16 current states costs, in training steps of 8 x 512 in bf16.
 
 Measured on two cores (docs/explanation/speed.md; loss alone by the same benchmark). Predicting the

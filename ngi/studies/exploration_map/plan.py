@@ -8,6 +8,7 @@ from itertools import product
 from ngi.studies.exploration_map.setting import (
     AT_MOST,
     BY_LOSS,
+    EAGER,
     METHODS,
     OURS,
     SELF_TUNING,
@@ -123,4 +124,5 @@ PLANS = {
     "ours_by_loss": replace(
         OURS_LONG, methods=tuple(method for method in OURS if method.reuse), reuse=BY_LOSS
     ),
+    "ours_eager": replace(OURS_LONG, methods=(Method(EAGER, reuse=True),), reuse=BY_LOSS),
 }

@@ -14,7 +14,10 @@ TARGETS = {
 ACCEPTANCES = {"greedy": "mcmc_loss_step", "metropolis": "mcmc_metropolis"}
 """And the option of the program's configuration that has it, all else being the same."""
 
-UNIFORM, PREDICTED = "uniform", "predicted"
+UNIFORM, PREDICTED, EAGER = "uniform", "predicted", "eager"
+PREDICTING = {PREDICTED: "predicted_loss", EAGER: "predicted_loss_eager"}
+"""Samplers without chains, and the option of the program's configuration that each is."""
+
 SAMPLERS = (UNIFORM, *(f"{target}_{rule}" for target, rule in product(TARGETS, ACCEPTANCES)))
 
 SELF_TUNING = ("reuse=self_tuning", "reuse.policy.bootstrap_batches=20", "reuse.policy.beta=2.0")
@@ -56,8 +59,8 @@ class Setting:
 class Method:
     """A way of choosing samples.
 
-    sampler: one of `SAMPLERS`: "uniform", or a target and an acceptance rule; or `PREDICTED`; or of
-        `KNOWN`, which takes the place of the uniform one
+    sampler: one of `SAMPLERS`: "uniform", or a target and an acceptance rule; or of `PREDICTING`;
+        or of `KNOWN`, which takes the place of the uniform one
     reuse: whether stored patches are trained on again, as the plan says
     """
 
@@ -67,7 +70,7 @@ class Method:
     @property
     def predicts(self) -> bool:
         """Whether states are drawn by their predicted losses, without chains."""
-        return self.sampler == PREDICTED
+        return self.sampler in PREDICTING
 
     @property
     def name(self) -> str:
@@ -80,7 +83,7 @@ class Method:
         if self.sampler == UNIFORM or self.sampler in KNOWN:
             return [f"sampler={UNIFORM}"]
         if self.predicts:
-            return ["sampler=predicted_loss"]
+            return [f"sampler={PREDICTING[self.sampler]}"]
         target, rule = self.sampler.rsplit("_", 1)
         return [
             f"sampler={ACCEPTANCES[rule]}",

@@ -113,9 +113,21 @@ def test_by_loss_differs_from_the_long_plan_in_what_stored_patches_are_drawn() -
     assert replace(by_loss, methods=long.methods, reuse=long.reuse) == long
 
 
-def test_predictions_are_counted_as_scores_are() -> None:
+def test_eager_predictions_differ_in_how_states_are_drawn_from_them() -> None:
+    plan = PLANS["ours_eager"]
+    predicted, eager = Method("predicted", reuse=True), Method("eager", reuse=True)
+    assert plan == replace(PLANS["ours_by_loss"], methods=(eager,))
+    made, other = (training.plain_configuration(method, plan) for method in (eager, predicted))
+    draws, usual = (each["sampler"].pop("importance") for each in (made, other))
+    assert made == other
+    assert draws["largest_ratio"] > usual["largest_ratio"]
+    assert draws["uniform_share"] < usual["uniform_share"]
+
+
+@pytest.mark.parametrize("sampler", ["predicted", "eager"])
+def test_predictions_are_counted_as_scores_are(sampler: str) -> None:
     """One per new batch, also where chains would have nothing to be compared with yet."""
-    method = Method("predicted", reuse=False)
+    method = Method(sampler, reuse=False)
     last = rows(method)[-1]
     assert configuration(method).sampler._target_ == "ngi.explore.PredictedLoss"
     assert (last["generated_batches"], last["scored_batches"]) == (12, 12)
