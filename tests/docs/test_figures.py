@@ -137,6 +137,9 @@ def test_the_readme_says_of_predicted_losses_what_their_table_says() -> None:
     )
     assert shown == [f"{float(figure):.0f}" for figure in measured]
     assert share == times
+    eager = r"base .+?predicted loss, eager .+%.+?-\d+\.\d ± \d+\.\d % \| +(\d+\.\d) \|"
+    (ratio,) = said("docs/exploration-ceiling/eager/errors.md", eager)
+    assert said("README.md", r", and in 1/(\d+) with as little") == (f"{float(ratio):.0f}",)
 
 
 def test_the_readme_says_of_the_oracle_what_the_study_says() -> None:
