@@ -40,12 +40,21 @@ class JitTracer(Tracer):
     whatever the size.
 
     changes: a number that is another one whenever the scene differs in more than the camera
+    recorded: False where Dr.Jit must not record anything of this scene
     """
 
-    def __init__(self, *, scene: mi.Scene, first_hit: FirstHit, changes: Callable[[], int]) -> None:
+    def __init__(
+        self,
+        *,
+        scene: mi.Scene,
+        first_hit: FirstHit,
+        changes: Callable[[], int],
+        recorded: bool = True,
+    ) -> None:
         self._scene = scene
         caustics = first_hit.caustics
-        self._light = None if caustics is None else _PhotonLight(scene, caustics, changes)
+        replayed = _replayed if recorded else _traced_anew
+        self._light = None if caustics is None else _PhotonLight(scene, caustics, changes, replayed)
         self._points: dict[int, tuple[mi.Point2f, list[mi.Float]]] = {}
         # Plain functions, not methods: a frozen function follows the arrays of its arguments only,
         # and holds what is constant for this tracer in its closure.
@@ -79,8 +88,8 @@ class JitTracer(Tracer):
             channels = first_hit.channels(scene, ray, light_point, *light)
             return _block_sums(channels, samples)
 
-        self._radiance = _replayed(trace_radiance)
-        self._buffers = _replayed(trace_buffers)
+        self._radiance = replayed(trace_radiance)
+        self._buffers = replayed(trace_buffers)
         self._trace_radiance = trace_radiance
         self._ready = False
 
@@ -125,14 +134,20 @@ class _PhotonLight:
     changes: see `JitTracer`
     """
 
-    def __init__(self, scene: mi.Scene, caustics: Caustics, changes: Callable[[], int]) -> None:
+    def __init__(
+        self,
+        scene: mi.Scene,
+        caustics: Caustics,
+        changes: Callable[[], int],
+        replayed: Callable[[Trace], Trace],
+    ) -> None:
         def trace_photons(scene: mi.Scene, photons: list[mi.Float]) -> list[mi.Float]:
             light = caustics.trace(scene, photons)
             dr.eval(light)
             return [light]
 
         self._scene, self._photons, self._changes = scene, photon_points(), changes
-        self._trace = _replayed(trace_photons)
+        self._trace = replayed(trace_photons)
         self._light: list[mi.Float] = []
         self._light_of = -1
 
@@ -177,6 +192,11 @@ def _replayed(function: Trace) -> Trace:
         return function(*arguments)
 
     return trace
+
+
+def _traced_anew(function: Trace) -> Trace:
+    """The function, whose Python runs every time."""
+    return function
 
 
 def free_memory() -> None:

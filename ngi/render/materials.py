@@ -99,7 +99,16 @@ def colour(texture: mi.Texture | None) -> Lookup:
     """Of a texture, or white where there is none."""
     if texture is None:
         return lambda _hit, _active: mi.Color3f(1)
-    return lambda hit, active: mi.Color3f(texture.eval(hit, active))
+    return lambda hit, active: mi.Color3f(texture.eval(hit, _looked_up(active)))
+
+
+def _looked_up(active: mi.Bool) -> mi.Bool:
+    """Where a texture is read: on CUDA everywhere, since who asks takes only what is active.
+
+    Dr.Jit 1.5 ends the process where a kernel that is recorded reads a texture of the GPU for some
+    of its threads only (docs/upstream.md).
+    """
+    return mi.Bool(True) if mi.variant().startswith("cuda") else active
 
 
 def _constant_colour(texture: mi.Texture | None) -> tuple[float, ...] | None:
@@ -132,7 +141,8 @@ def _rough(bsdf: mi.BSDF, children: dict[str, mi.Object]) -> tuple[Lookup, float
     textures = [children[name] for name in names]
 
     def roughness(hit: mi.SurfaceInteraction3f, active: mi.Bool) -> mi.Float:
-        return sum(texture.eval_1(hit, active) for texture in textures) / len(textures)
+        here = _looked_up(active)
+        return sum(texture.eval_1(hit, here) for texture in textures) / len(textures)
 
     return roughness, _mean_of_uniform(textures)
 
@@ -142,7 +152,7 @@ def _principled(_bsdf: mi.BSDF, children: dict[str, mi.Object]) -> tuple[Lookup,
     texture = children["roughness"]
     constant = _mean_of_uniform([texture])
     return (
-        lambda hit, active: dr.square(texture.eval_1(hit, active)),
+        lambda hit, active: dr.square(texture.eval_1(hit, _looked_up(active))),
         None if constant is None else constant**2,
     )
 

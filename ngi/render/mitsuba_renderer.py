@@ -11,17 +11,15 @@ import torch
 from torch import Tensor
 
 from ngi.machine.backend import activate, describe, mi
-from ngi.render.first_hit import FirstHit, first_hit_of
+from ngi.render.first_hit import first_hit_of
 from ngi.render.fitting import FittingTracer
-from ngi.render.jit_tracer import JitTracer, free_memory
 from ngi.render.needs import buffers_are_static
 from ngi.render.projection import Projection
 from ngi.render.protocol import RenderedPatches, Renderer
-from ngi.render.scalar_tracer import ScalarTracer
+from ngi.render.tracers import tracer_of
 from ngi.render.tracing import (
     SAMPLES_PER_PASS,
     Pending,
-    Tracer,
     bands,
     check_states,
     choose,
@@ -101,7 +99,7 @@ class MitsubaRenderer(Renderer):
             trace_caustics=direct == "with_caustics",
         )
         self.buffer_samples = buffer_samples or BUFFER_SAMPLES[self._variant]
-        self._tracer = _tracer(self._variant, self._scene, first_hit)
+        self._tracer = tracer_of(self._variant, self._scene, first_hit)
         self.layout = first_hit.layout
         self._static = needed_only and buffers_are_static(self._scene, self.layout)
         self._static_buffers: dict[int, Tensor] = {}
@@ -272,13 +270,6 @@ class HalvesRenderer(MitsubaRenderer):
     """Patches have `RenderedPatches.first_half`; ValueError for an odd number of samples."""
 
     halves = True
-
-
-def _tracer(variant: str, scene: VariableScene, first_hit: FirstHit) -> Tracer:
-    if variant == "scalar_rgb":
-        return ScalarTracer(scene=scene.scene, first_hit=first_hit)
-    tracer = JitTracer(scene=scene.scene, first_hit=first_hit, changes=lambda: scene.changes)
-    return FittingTracer(tracer, free=free_memory)
 
 
 def _broken(patches: list[tuple[Tensor, Tensor]]) -> list[int]:

@@ -1,0 +1,33 @@
+"""Which tracer a Mitsuba variant and a scene take."""
+
+from __future__ import annotations
+
+from ngi.render.first_hit import FirstHit
+from ngi.render.fitting import FittingTracer
+from ngi.render.jit_tracer import JitTracer, free_memory
+from ngi.render.scalar_tracer import ScalarTracer
+from ngi.render.tracing import Tracer
+from ngi.scene import SceneDescription
+from ngi.scene.variable_scene import VariableScene
+
+
+def tracer_of(variant: str, scene: VariableScene, first_hit: FirstHit) -> Tracer:
+    """What traces a scene with the active variant."""
+    if variant == "scalar_rgb":
+        return ScalarTracer(scene=scene.scene, first_hit=first_hit)
+    tracer = JitTracer(
+        scene=scene.scene,
+        first_hit=first_hit,
+        changes=lambda: scene.changes,
+        recorded=variant != "cuda_ad_rgb" or not _has_slow_textures(scene.description),
+    )
+    return FittingTracer(tracer, free=free_memory)
+
+
+def _has_slow_textures(description: SceneDescription) -> bool:
+    """Whether a bitmap is not to be read by the GPU's texture units.
+
+    Dr.Jit 1.5 ends the process where it records one that is not (docs/upstream.md).
+    """
+    values = description.document.root.iterfind(".//boolean[@name='accel']")
+    return any(value.get("value", "").lower() == "false" for value in values)
