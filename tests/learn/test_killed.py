@@ -19,16 +19,16 @@ LEARNER = (
     "averaging=exponential",
 )
 """Everything of ours about learning that the paper does not have."""
-WRITING = 0.3
-"""Share of the kills that wait until a file is being written."""
+AIMED_AT = {"writing": 0.3, "at the end": 0.15}
+"""Shares of the kills that wait for such a moment, however short it is; others wait for nothing."""
 
 
-def killed(process: ForkServerProcess, folder: Path, *, after: float, writing: bool) -> bool:
-    """Kills it after some seconds, at its next write if so wished; False where it ended before."""
+def killed(process: ForkServerProcess, folder: Path, *, after: float, aim: str | None) -> bool:
+    """Kills it after some seconds, at the next `moment` aimed at; False where it ended before."""
     since = time.monotonic()
     while process.is_alive():
         due = time.monotonic() - since >= after
-        if due and (not writing or any(folder.rglob("*.partial"))):
+        if due and aim in (None, moment(folder)):
             process.kill()
             break
         time.sleep(0.0005)
@@ -52,7 +52,7 @@ def test_runs_killed_at_many_moments_end_bit_for_bit_like_an_unbroken_one(
     life = time.monotonic() - since
     assert_same_run(unbroken / "run", unbroken / "first")
 
-    generator = random.Random(5)
+    generator, shares = random.Random(5), AIMED_AT.values()
     moments: Counter[str] = Counter()
     for folder in (tmp_path / f"run{number}" for number in itertools.count()):
         folder.mkdir()
@@ -62,7 +62,7 @@ def test_runs_killed_at_many_moments_end_bit_for_bit_like_an_unbroken_one(
             start(config, folder / "output"),
             folder,
             after=generator.uniform(0, life),
-            writing=generator.random() < WRITING,
+            aim=generator.choices([*AIMED_AT, None], [*shares, 1 - sum(shares)])[0],
         ):
             moments[moment(folder)] += 1
         if moments.total() == kills:
@@ -76,7 +76,7 @@ def test_runs_killed_at_many_moments_end_bit_for_bit_like_an_unbroken_one(
 
 
 def moment(folder: Path) -> str:
-    """What a run that was just killed was about."""
+    """What a run is about, or was when it was killed."""
     if any(folder.rglob("*.partial")):
         return "writing"
     if (folder / "run" / "pictures").exists():
