@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+
 from ngi.render.first_hit import FirstHit
 from ngi.render.fitting import FittingTracer
 from ngi.render.jit_tracer import JitTracer, free_memory
@@ -10,16 +12,25 @@ from ngi.render.tracing import Tracer
 from ngi.scene import SceneDescription
 from ngi.scene.variable_scene import VariableScene
 
+_logger = logging.getLogger(__name__)
+
 
 def tracer_of(variant: str, scene: VariableScene, first_hit: FirstHit) -> Tracer:
     """What traces a scene with the active variant."""
     if variant == "scalar_rgb":
         return ScalarTracer(scene=scene.scene, first_hit=first_hit)
+    recorded = variant != "cuda_ad_rgb" or not _has_slow_textures(scene.description)
+    if not recorded:
+        _logger.warning(
+            "%s: pictures of this scene take longer, since a bitmap has accel=false, which Dr.Jit "
+            "1.5 cannot record on CUDA; take it out, if its precision is not needed",
+            scene.description.document.path,
+        )
     tracer = JitTracer(
         scene=scene.scene,
         first_hit=first_hit,
         changes=lambda: scene.changes,
-        recorded=variant != "cuda_ad_rgb" or not _has_slow_textures(scene.description),
+        recorded=recorded,
     )
     return FittingTracer(tracer, free=free_memory)
 

@@ -59,7 +59,12 @@ def scene_with(accel: str, folder: Path) -> VariableScene:
     ],
 )
 def test_nothing_is_recorded_where_a_bitmap_is_not_for_the_texture_units(
-    variant: str, accel: str, recordings: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    variant: str,
+    accel: str,
+    recordings: int,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
 ) -> None:
     scene = scene_with(f'<boolean name="accel" value="{accel}"/>', tmp_path)
     first_hit = first_hit_of(
@@ -75,6 +80,7 @@ def test_nothing_is_recorded_where_a_bitmap_is_not_for_the_texture_units(
     monkeypatch.setattr(dr, "freeze", counted)
     tracer = tracers.tracer_of(variant, scene, first_hit)
     assert len(recorded) == recordings
+    assert ("accel=false" in caplog.text) == (recordings == 0)
     for trace in ("radiance", "buffers"):
         options = {"samples": 4} | ({"seed": 3} if trace == "radiance" else {})
         one, other = (getattr(t, trace)(WINDOW, **options)() for t in (tracer, expected))
