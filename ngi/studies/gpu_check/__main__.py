@@ -13,13 +13,31 @@ from pathlib import Path
 import ngi.studies.gpu_check
 from ngi.studies.gpu_check.item import CutOffError, Item
 from ngi.studies.gpu_check.record import Record
+from ngi.studies.gpu_check.survival import surviving
 
 LEFT = 3
 """Exit status where the time was up before everything was measured."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """0 once everything is measured, 1 where something failed, 3 where more time is needed."""
+    """0 once everything is measured, 1 where something failed, 3 where more time is needed.
+
+    All of it is measured in a process of its own, and in another one where a library ended that.
+    """
+    given = sys.argv[1:] if arguments is None else arguments
+    chosen = _parser().parse_args(given)
+    end = time.monotonic() + 60 * chosen.minutes
+
+    def command() -> list[str]:
+        left = f"--minutes={(end - time.monotonic()) / 60}"
+        code = "from ngi.studies.gpu_check.__main__ import check; raise SystemExit(check())"
+        return [sys.executable, "-c", code, *given, left]
+
+    return surviving(command, progress=chosen.output)
+
+
+def check(arguments: Sequence[str] | None = None) -> int:
+    """As `main`, in this process."""
     chosen = _parser().parse_args(arguments)
     import torch
 

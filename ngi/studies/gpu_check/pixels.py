@@ -15,7 +15,8 @@ from ngi.studies.gpu_check.item import Outcome
 
 BACKENDS = ("llvm", "cuda")
 BUFFER_TOLERANCE = 1e-3
-"""Buffers are in [-1, 1] or logarithms; further apart than that a pixel is another surface's."""
+"""Buffers are in [-1, 1] or logarithms; further apart than that a pixel is another surface's, or a
+magnified bitmap's, which a GPU's texture units blend with 8 bits of fraction."""
 RADIANCE_TOLERANCE = 1e-2
 """Relative to 1 + radiance. Both backends take the same random numbers."""
 

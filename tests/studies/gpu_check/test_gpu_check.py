@@ -13,7 +13,7 @@ import torch
 from ngi.machine.provenance import provenance
 from ngi.studies.benchmark.figures import figure
 from ngi.studies.benchmark.scenes import one_per_folder
-from ngi.studies.gpu_check.__main__ import main, work
+from ngi.studies.gpu_check.__main__ import check, work
 from ngi.studies.gpu_check.item import CutOffError, Item, Outcome
 from ngi.studies.gpu_check.pixels import differences
 from ngi.studies.gpu_check.plan import Sizes, items
@@ -140,7 +140,7 @@ def test_at_full_size_it_measures_every_scene_method_and_part(tmp_path: Path) ->
 def test_without_a_gpu_it_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     if torch.cuda.is_available():
         pytest.skip("there is a GPU")
-    assert main(["--output", str(tmp_path)]) == 1
+    assert check(["--output", str(tmp_path)]) == 1
     assert "--dry-run" in capsys.readouterr().out
 
 
@@ -159,7 +159,7 @@ def test_the_dry_run_goes_through_everything(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("ngi.studies.gpu_check.runs.run", short_run)
-    assert main(["--dry-run", "--output", str(tmp_path)]) == 0
+    assert check(["--dry-run", "--output", str(tmp_path)]) == 0
     (file,) = tmp_path.rglob("gpu-check.json")
     found = json.loads(file.read_text())["items"]
     stages = {key.partition("/")[0] for key in found}

@@ -1,0 +1,70 @@
+"""A process that a fault of a library ends is followed by another one, as long as that helps."""
+
+import signal
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from ngi.studies.gpu_check import __main__ as gpu_check
+from ngi.studies.gpu_check.survival import surviving
+
+CODE = """
+import os, sys
+from pathlib import Path
+file, ends, writes = Path(sys.argv[1]) / "card" / "gpu-check.json", *map(int, sys.argv[2:])
+file.parent.mkdir(exist_ok=True)
+begun = len(file.read_text()) if file.exists() else 0
+if writes:
+    file.write_text("x" * (begun + 1))
+if begun < 3:
+    os.kill(os.getpid(), ends)
+raise SystemExit(7)
+"""
+
+
+def ended(folder: Path, by: int, *, writes: bool = True) -> tuple[int, int]:
+    """Status, and how many processes there were; each of the first three is ended."""
+    begun = []
+
+    def command() -> list[str]:
+        begun.append(time.monotonic())
+        return [sys.executable, "-c", CODE, str(folder), str(int(by)), str(int(writes))]
+
+    return surviving(command, progress=folder), len(begun)
+
+
+def test_after_a_fault_another_process_goes_on(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert ended(tmp_path, signal.SIGABRT) == (7, 4)
+    assert capsys.readouterr().out.count("SIGABRT ended the process") == 3
+
+
+def test_a_fault_before_anything_is_begun_is_not_met_for_ever(tmp_path: Path) -> None:
+    assert ended(tmp_path, signal.SIGSEGV, writes=False) == (-signal.SIGSEGV, 1)
+
+
+@pytest.mark.parametrize("asked", [signal.SIGTERM, signal.SIGKILL])
+def test_who_ends_the_process_ends_the_command(tmp_path: Path, asked: signal.Signals) -> None:
+    assert ended(tmp_path, asked) == (-asked, 1)
+
+
+def test_the_next_process_has_the_time_that_is_left(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    left: list[float] = []
+
+    def crash_once(words: list[str], **_: object) -> object:
+        assert words[3:-1] == ["--minutes", "2", "--output", str(tmp_path)]
+        left.append(float(words[-1].removeprefix("--minutes=")))
+        (tmp_path / "gpu-check.json").write_text("x" * len(left))
+        clock[0] += 30
+        return type("Done", (), {"returncode": -signal.SIGABRT if len(left) < 3 else 3})
+
+    clock = [100.0]
+    monkeypatch.setattr(gpu_check.time, "monotonic", lambda: clock[0])
+    monkeypatch.setattr("ngi.studies.gpu_check.survival.subprocess.run", crash_once)
+    assert gpu_check.main(["--minutes", "2", "--output", str(tmp_path)]) == 3
+    assert left == pytest.approx([2, 1.5, 1])
