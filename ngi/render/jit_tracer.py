@@ -53,8 +53,7 @@ class JitTracer(Tracer):
     ) -> None:
         self._scene = scene
         caustics = first_hit.caustics
-        replayed = _replayed if recorded else _traced_anew
-        self._light = None if caustics is None else _PhotonLight(scene, caustics, changes, replayed)
+        self._light = None if caustics is None else _PhotonLight(scene, caustics, changes, recorded)
         self._points: dict[int, tuple[mi.Point2f, list[mi.Float]]] = {}
         # Plain functions, not methods: a frozen function follows the arrays of its arguments only,
         # and holds what is constant for this tracer in its closure.
@@ -88,8 +87,8 @@ class JitTracer(Tracer):
             channels = first_hit.channels(scene, ray, light_point, *light)
             return _block_sums(channels, samples)
 
-        self._radiance = replayed(trace_radiance)
-        self._buffers = replayed(trace_buffers)
+        self._radiance = _replayed(trace_radiance, recorded=recorded)
+        self._buffers = _replayed(trace_buffers, recorded=recorded)
         self._trace_radiance = trace_radiance
         self._ready = False
 
@@ -131,15 +130,11 @@ class JitTracer(Tracer):
 class _PhotonLight:
     """What photons leave in the scene, traced once while nothing but the camera moves.
 
-    changes: see `JitTracer`
+    changes, recorded: see `JitTracer`
     """
 
     def __init__(
-        self,
-        scene: mi.Scene,
-        caustics: Caustics,
-        changes: Callable[[], int],
-        replayed: Callable[[Trace], Trace],
+        self, scene: mi.Scene, caustics: Caustics, changes: Callable[[], int], recorded: bool
     ) -> None:
         def trace_photons(scene: mi.Scene, photons: list[mi.Float]) -> list[mi.Float]:
             light = caustics.trace(scene, photons)
@@ -147,7 +142,7 @@ class _PhotonLight:
             return [light]
 
         self._scene, self._photons, self._changes = scene, photon_points(), changes
-        self._trace = replayed(trace_photons)
+        self._trace = _replayed(trace_photons, recorded=recorded)
         self._light: list[mi.Float] = []
         self._light_of = -1
 
@@ -170,20 +165,22 @@ def _points(samples: int) -> tuple[mi.Point2f, list[mi.Float]]:
     return on_device
 
 
-def _replayed(function: Trace) -> Trace:
+def _replayed(function: Trace, *, recorded: bool) -> Trace:
     """The function with its kernel launches recorded and replayed, where Dr.Jit can do that.
 
     Dr.Jit 1.5 cannot always, for example where another scene was loaded meanwhile: then Python
     traces the function again every time, which costs time but compiles nothing either.
     """
+    if not recorded:
+        return function
     # A variable material makes a recording for every combination of the choices.
-    recorded, works = dr.freeze(function, warn_after=RECORDINGS), True
+    replayed, works = dr.freeze(function, warn_after=RECORDINGS), True
 
     def trace(*arguments: Any) -> list[mi.Float]:
         nonlocal works
         if works:
             try:
-                return list(recorded(*arguments))
+                return list(replayed(*arguments))
             except RuntimeError as error:
                 if does_not_fit(error):
                     raise
@@ -192,11 +189,6 @@ def _replayed(function: Trace) -> Trace:
         return function(*arguments)
 
     return trace
-
-
-def _traced_anew(function: Trace) -> Trace:
-    """The function, whose Python runs every time."""
-    return function
 
 
 def free_memory() -> None:

@@ -56,7 +56,7 @@ def test_the_next_process_has_the_time_that_is_left(
 ) -> None:
     left: list[float] = []
 
-    def crash_once(words: list[str], **_: object) -> object:
+    def crash_twice(words: list[str], **_: object) -> object:
         assert words[3:-1] == ["--minutes", "2", "--output", str(tmp_path)]
         left.append(float(words[-1].removeprefix("--minutes=")))
         (tmp_path / "gpu-check.json").write_text("x" * len(left))
@@ -65,6 +65,6 @@ def test_the_next_process_has_the_time_that_is_left(
 
     clock = [100.0]
     monkeypatch.setattr(gpu_check.time, "monotonic", lambda: clock[0])
-    monkeypatch.setattr("ngi.studies.gpu_check.survival.subprocess.run", crash_once)
+    monkeypatch.setattr("ngi.studies.gpu_check.survival.subprocess.run", crash_twice)
     assert gpu_check.main(["--minutes", "2", "--output", str(tmp_path)]) == 3
     assert left == pytest.approx([2, 1.5, 1])
