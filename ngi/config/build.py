@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,7 @@ if TYPE_CHECKING:  # PyTorch and Lightning take seconds that --help need not wai
 
     from ngi import learn
     from ngi.render import Renderer
+    from ngi.reuse import ReusePolicy
 
 
 def build_samples(config: DictConfig, *, renderer: Renderer) -> learn.Samples:
@@ -24,7 +26,12 @@ def build_samples(config: DictConfig, *, renderer: Renderer) -> learn.Samples:
 
 
 def build_stream(
-    config: DictConfig, *, samples: learn.Samples, clock: learn.PhaseClock, patches: Path
+    config: DictConfig,
+    *,
+    renderer: Renderer,
+    samples: learn.Samples,
+    clock: learn.PhaseClock,
+    patches: Path,
 ) -> learn.TrainingStream:
     """The stream of training batches. patches: folder that its store is archived in."""
     from ngi.learn import TrainingStream
@@ -38,13 +45,19 @@ def build_stream(
                 layout=samples.layout, device=_training_device(config)
             ),
             archive=PatchArchive(patches),
-            policy=instantiate(config.reuse.policy),
+            policy=_policy(config, samples_per_pixel=renderer.samples_per_pixel),
             when_late=config.reuse.when_late,
         ),
         schedule=instantiate(config.resolution),
         clock=clock,
         seed=config.seed,
     )
+
+
+def _policy(config: DictConfig, *, samples_per_pixel: int) -> ReusePolicy:
+    """The reuse policy; one that is configured in part is told how clean patches are."""
+    policy: ReusePolicy | partial[ReusePolicy] = instantiate(config.reuse.policy)
+    return policy(samples_per_pixel=samples_per_pixel) if isinstance(policy, partial) else policy
 
 
 def build_network(config: DictConfig, *, samples: learn.Samples) -> nn.Module:
@@ -95,7 +108,9 @@ def build_run(
     schedule.check(budget)
     clock = learn.PhaseClock(energy=EnergyMeter(energy_counters()))
     samples = build_samples(config, renderer=renderer)
-    stream = build_stream(config, samples=samples, clock=clock, patches=folder.patches)
+    stream = build_stream(
+        config, renderer=renderer, samples=samples, clock=clock, patches=folder.patches
+    )
     costs = folder.settings["costs"]
     return learn.Run(
         folder=folder,

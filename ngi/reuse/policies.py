@@ -97,6 +97,23 @@ class FixedProbability(ReusePolicy):
         self._bootstrap_batches = bootstrap_batches
         self._probability = probability
 
+    @classmethod
+    def by_samples(
+        cls, *, bootstrap_batches: int, times_at_32: float, samples_per_pixel: int
+    ) -> Self:
+        """So that a patch is trained on the more often the less noise it has (ours, docs/learner).
+
+        times_at_32: how often one of 32 samples per pixel is, on average; others in proportion to
+            the square root of their samples per pixel, as noise is in inverse proportion to it,
+            and at least once
+
+        Raises ValueError where that is no number, or not above 0.
+        """
+        times = times_at_32 * math.sqrt(samples_per_pixel / 32)
+        if not 0 < times < math.inf:
+            raise ValueError(f"times_at_32: {times_at_32}: give a number above 0")
+        return cls(bootstrap_batches=bootstrap_batches, probability=max(0.0, 1 - 1 / times))
+
     def probability(
         self, state: PolicyState, *, generated_batches: int, store_size: int, store_capacity: int
     ) -> float:

@@ -111,7 +111,9 @@ def _step_seconds(
         clock = learn.PhaseClock()
         run = learn.RunFolder(Path(folder), settings={})
         samples = build_samples(config, renderer=stand_in)
-        stream = build_stream(config, samples=samples, clock=clock, patches=run.patches)
+        stream = build_stream(
+            config, renderer=stand_in, samples=samples, clock=clock, patches=run.patches
+        )
         module = build_module(config, samples=samples, stream=stream, folder=Path(folder))
         timer = StepTimer(clock=clock, scored=scored, seconds=SECONDS)
         steps = learn.StepLog(stream=stream, run_clock=clock, folder=run, tracker=learn.Local())

@@ -103,7 +103,7 @@ def test_ours_differs_in_every_part_that_can_be_taken_out_again(method: str) -> 
         "schedule": "warmup_stable_decay",
         "averaging": "exponential",
         "data": "denoised_patches",
-        "reuse": "steady",
+        "reuse": "by_samples",
     }
 
 
@@ -112,6 +112,15 @@ def test_ours_trains_on_images_as_large_as_those_that_are_shown() -> None:
         config = composed("method=ours", f"budget={budget}")
         schedule = instantiate(config.resolution)
         assert [schedule.resolution(step) for step in (0, 10**6)] == [shown, shown]
+
+
+def test_patches_are_the_cleaner_the_longer_a_budget_is() -> None:
+    samples = [
+        composed("method=ours", f"budget={budget}").renderer.samples_per_pixel
+        for budget in ("smoke", "small", "machine", "hour")
+    ]
+    assert samples == sorted(samples)
+    assert composed("budget=paper").renderer.samples_per_pixel is None  # the scene's own
 
 
 def test_the_store_of_a_competitor_holds_as_many_pixels() -> None:

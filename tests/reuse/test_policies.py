@@ -124,6 +124,36 @@ def test_every_policy_keeps_the_protocol(policy, expected) -> None:
 
 
 @pytest.mark.parametrize(
+    ("samples", "times"), [(8, 5.0), (32, 10.0), (128, 20.0), (800, 50.0), (32 * 10**4, 1000.0)]
+)
+def test_a_patch_is_trained_on_as_often_as_its_noise_is_low(samples: int, times: float) -> None:
+    """Of so many steps one is on new patches, which all the others then share."""
+    policy = FixedProbability.by_samples(
+        bootstrap_batches=0, times_at_32=10.0, samples_per_pixel=samples
+    )
+    new = 1 - policy.probability(policy.init(), **LATER)
+    assert new == pytest.approx(1 / times)
+
+
+def test_at_32_samples_ours_reuses_as_often_as_when_its_figures_were_measured() -> None:
+    policy = FixedProbability.by_samples(
+        bootstrap_batches=0, times_at_32=12.5, samples_per_pixel=32
+    )
+    assert policy.probability(policy.init(), **LATER) == 0.92
+
+
+def test_patches_too_noisy_to_be_reused_are_not() -> None:
+    policy = FixedProbability.by_samples(bootstrap_batches=0, times_at_32=2.0, samples_per_pixel=8)
+    assert policy.probability(policy.init(), **LATER) == 0
+
+
+@pytest.mark.parametrize("times", [0.0, -1.0, float("nan"), float("inf")])
+def test_how_often_is_a_number_above_0(times: float) -> None:
+    with pytest.raises(ValueError, match=f"times_at_32: {times}: give"):
+        FixedProbability.by_samples(bootstrap_batches=0, times_at_32=times, samples_per_pixel=32)
+
+
+@pytest.mark.parametrize(
     ("key", "value"),
     [
         ("bootstrap_batches", -1),

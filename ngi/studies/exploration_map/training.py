@@ -74,7 +74,9 @@ def train(setting: Setting, method: Method, seed: int, plan: Plan) -> Iterator[d
     renderer, test_set = _scene(setting, plan)
     clock = learn.PhaseClock()
     samples = build_samples(config, renderer=renderer)
-    stream = build_stream(config, samples=samples, clock=clock, patches=Path())  # not written
+    stream = build_stream(  # its patches are not written
+        config, renderer=renderer, samples=samples, clock=clock, patches=Path()
+    )
     if method.sampler in KNOWN:
         assert isinstance(stream.sampler, MarkovChains)
         stream.sampler.proposal = KnownPockets(

@@ -117,7 +117,7 @@ def _fit(
 ) -> None:
     clock = learn.PhaseClock()
     samples = build_samples(config, renderer=renderer)
-    stream = build_stream(config, samples=samples, clock=clock, patches=folder)
+    stream = build_stream(config, renderer=renderer, samples=samples, clock=clock, patches=folder)
     module = build_module(config, samples=samples, stream=stream, folder=folder)
     watch = _Watch(stream, disturbances, trained)
     test = _Test(TestSet(renderer.inner, frames=FRAMES), last_step=steps)

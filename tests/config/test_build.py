@@ -1,0 +1,37 @@
+"""What the parts of a run are told of each other."""
+
+from pathlib import Path
+
+import pytest
+from hydra.utils import instantiate
+
+from ngi import learn
+from ngi.config.build import build_samples, build_stream
+from ngi.config.configuration import composed
+from tests.learn.small_stream import steps
+
+
+@pytest.mark.parametrize(
+    ("reuse", "samples_per_pixel", "reused"),
+    [("by_samples", 2, 1 - 1 / 3.125), ("by_samples", 512, 0.98), ("steady", 512, 0.92)],
+)
+def test_a_reuse_policy_is_told_how_clean_patches_are_where_it_asks(
+    reuse: str, samples_per_pixel: int, reused: float, tmp_path: Path
+) -> None:
+    config = composed(
+        "renderer=analytic",
+        f"+renderer.samples_per_pixel={samples_per_pixel}",
+        f"reuse={reuse}",
+        "reuse.policy.bootstrap_batches=1",
+        "sampler=uniform",
+    )
+    renderer = instantiate(config.renderer)
+    stream = build_stream(
+        config,
+        renderer=renderer,
+        samples=build_samples(config, renderer=renderer),
+        clock=learn.PhaseClock(),
+        patches=tmp_path,
+    )
+    probabilities = [stream.reuse_probability for _ in steps(stream, 3)]
+    assert probabilities == [0, pytest.approx(reused), pytest.approx(reused)]
