@@ -45,7 +45,7 @@ def build_stream(
                 layout=samples.layout, device=_training_device(config)
             ),
             archive=PatchArchive(patches),
-            policy=_policy(config, samples_per_pixel=renderer.samples_per_pixel),
+            policy=reuse_policy(config, samples_per_pixel=renderer.samples_per_pixel),
             when_late=config.reuse.when_late,
         ),
         schedule=instantiate(config.resolution),
@@ -54,7 +54,7 @@ def build_stream(
     )
 
 
-def _policy(config: DictConfig, *, samples_per_pixel: int) -> ReusePolicy:
+def reuse_policy(config: DictConfig, *, samples_per_pixel: int) -> ReusePolicy:
     """The reuse policy; one that is configured in part is told how clean patches are."""
     policy: ReusePolicy | partial[ReusePolicy] = instantiate(config.reuse.policy)
     return policy(samples_per_pixel=samples_per_pixel) if isinstance(policy, partial) else policy

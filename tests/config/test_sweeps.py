@@ -6,8 +6,10 @@ import pytest
 import yaml
 from hydra.utils import instantiate
 
+from ngi.config.build import reuse_policy
 from ngi.files.resources import root
 from ngi.patches import BufferLayout
+from ngi.reuse import PolicyState
 from tests.config.command_line import composed
 
 BUDGETS = ("smoke", "small", "paper")
@@ -73,8 +75,9 @@ def check_method(method: str, budget: str, *more: str) -> None:
     config = composed(f"budget={budget}", f"method={method}", *more)
     assert config.label.budget == budget
     assert config.label.method == method
-    for part in (config.sampler, config.reuse.policy, config.resolution, config.budget):
+    for part in (config.sampler, config.resolution, config.budget):
         instantiate(part)
+    assert reuse_policy(config, samples_per_pixel=32).init() == PolicyState()
     assert instantiate(config.model)(layout=BufferLayout(), scene_dimensions=3) is not None
 
 

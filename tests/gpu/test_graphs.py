@@ -166,6 +166,7 @@ def test_in_such_a_run_steps_on_stored_patches_wait_for_nothing(
     options = (
         *of_constant_rate(name),
         *others,
+        "reuse=steady",
         "reuse.policy.probability=0.96",  # enough of them in so few steps
         "evaluation.count=1",
     )  # saved and evaluated at the end only
