@@ -64,11 +64,6 @@ class ReusePolicy(Protocol):
         return replace(state, generated_batches=state.generated_batches + (not reused))
 
 
-CLEANEST = 512
-"""Samples per pixel from which on patches are not trained on any more often: 94 times, as the rule
-would have it at 1,800, has more error than 50 times (docs/exploration-ceiling)."""
-
-
 class Never(ReusePolicy):
     """Generates every batch: the paper's test of the samples' distribution (Sec. 5.1)."""
 
@@ -90,6 +85,11 @@ class UntilFull(ReusePolicy):
         self, state: PolicyState, *, generated_batches: int, store_size: int, store_capacity: int
     ) -> float:
         return 1.0 if store_size >= store_capacity else 0.0
+
+
+CLEANEST = 512
+"""Samples per pixel from which on patches are not trained on any more often: 94 times, as the rule
+would have it at 1,800, has more error than 50 times (docs/exploration-ceiling)."""
 
 
 class FixedProbability(ReusePolicy):
