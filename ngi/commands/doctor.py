@@ -12,6 +12,7 @@ from pathlib import Path
 
 from ngi.config.options import run_tool
 from ngi.machine.provenance import LIBRARIES
+from ngi.machine.size import usable_cores
 
 
 @dataclass
@@ -58,7 +59,7 @@ def libraries() -> Finding:
 def torch_device() -> Finding:
     import torch
 
-    threads = f"{torch.get_num_threads()} threads of {os.cpu_count()} cores"
+    threads = f"{torch.get_num_threads()} threads of {usable_cores()} cores"
     if torch.cuda.is_available():
         return Finding("PyTorch on a GPU", True, torch.cuda.get_device_name())
     build = "a CUDA build that sees no GPU" if torch.version.cuda else "a CPU build"

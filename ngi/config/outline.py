@@ -1,9 +1,10 @@
 """Lines that say what a run trains, so that what followed from budget and machine is seen."""
 
-import os
 from collections.abc import Mapping
 from functools import partial
 from typing import Any
+
+from ngi.machine.size import usable_cores
 
 
 def outline(config: Mapping[str, Any]) -> str:
@@ -20,7 +21,7 @@ def outline(config: Mapping[str, Any]) -> str:
     limits = [f"{steps} steps"] if steps is not None else []
     if seconds is not None:
         limits.append(f"{seconds:g} s")
-    machine = f"{os.cpu_count()} cores ({value('trainer.precision')})"
+    machine = f"{usable_cores()} cores ({value('trainer.precision')})"
     parts = [
         value("label.method") or value("label.sampler"),
         f"{' or '.join(limits)} on {machine}",

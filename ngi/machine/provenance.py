@@ -1,7 +1,6 @@
 """Where a result comes from: commit, library versions and machine."""
 
 import hashlib
-import os
 import platform
 import subprocess
 from importlib.metadata import PackageNotFoundError, version
@@ -9,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import ngi
+from ngi.machine.size import usable_cores
 
 SCHEMA_VERSION = 1
 
@@ -27,7 +27,7 @@ def provenance(*, backend: str) -> dict[str, Any]:
         "versions": {"python": platform.python_version(), **_versions()},
         "machine": {
             "processor": _processor(),
-            "cores": os.cpu_count(),
+            "cores": usable_cores(),
             "threads": torch.get_num_threads(),
             "gpu": torch.cuda.get_device_name() if torch.cuda.is_available() else None,
             "backend": backend,

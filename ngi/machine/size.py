@@ -1,5 +1,6 @@
-"""Which size of network suits this machine, and how it begins a run of a given length."""
+"""How large this machine is: its network, its cores, how it begins a run of a given length."""
 
+import os
 from typing import Any
 
 SECONDS_PER_BATCH = 15.0
@@ -20,6 +21,11 @@ def network_width() -> int:
 def network_depth() -> int:
     """Number of hidden layers: 8 on a GPU (paper, Sec. 4.2), 6 on a processor."""
     return 8 if _has_gpu() else 6
+
+
+def usable_cores() -> int:
+    """Processor cores that this process may use: fewer than the machine has where it is pinned."""
+    return len(os.sched_getaffinity(0))
 
 
 def bootstrap_batches(seconds: float | None) -> int:

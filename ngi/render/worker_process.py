@@ -18,6 +18,7 @@ from threading import Thread
 import torch
 
 from ngi.machine.memory import keep_freed_memory
+from ngi.machine.size import usable_cores
 from ngi.render.worker_protocol import RenderServer, Reply, Request, Worker, WorkerDiedError
 
 NICENESS = 10
@@ -41,7 +42,7 @@ class WorkerProcess(Worker):
         if gpus:
             environment["CUDA_VISIBLE_DEVICES"] = gpus[(number + 1) % len(gpus)]  # 0 trains
         niceness = 0 if gpus else NICENESS
-        threads = max(1, (len(os.sched_getaffinity(0)) + number) // of)
+        threads = max(1, (usable_cores() + number) // of)
         self._connection, theirs = Pipe()
         with theirs:
             numbers = map(str, (theirs.fileno(), threads, niceness))

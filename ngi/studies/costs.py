@@ -23,6 +23,7 @@ from ngi.config.hydra_program import MESSAGES, completed, fail, run_program, wit
 from ngi.config.values import check_values
 from ngi.files.resources import cache_folder, root
 from ngi.machine.memory import keep_freed_memory
+from ngi.machine.size import usable_cores
 
 if TYPE_CHECKING:
     from ngi.learn import Component, CostFile
@@ -134,7 +135,7 @@ def _warn_if_busy() -> None:
             "this machine is busy (load average %.1f on %d cores): costs measured now are those of "
             "a busy machine; stop what else is running, delete them from the file, measure again",
             load,
-            os.cpu_count() or 1,
+            usable_cores(),
         )
 
 

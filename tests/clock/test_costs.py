@@ -182,6 +182,16 @@ def test_a_missing_component_is_named_with_the_remedy(tmp_path: Path) -> None:
         file.costs([component(), rendering])
 
 
+def test_costs_measured_on_different_numbers_of_cores_are_not_added_up(tmp_path: Path) -> None:
+    file = CostFile(tmp_path / "costs.json")
+    training, rendering, scoring = map(component, ("training", "rendering", "scoring"))
+    for part, cores in ((training, 2), (rendering, 1), (scoring, 2)):
+        file.add(part, {"train": [1.0]}, measured_by={"machine": {"cores": cores}})
+    assert set(file.costs([training, scoring])) == {"training", "scoring"}
+    with pytest.raises(ValueError, match=r"costs\.json.*cores: .*rendering-\w+': 1.*ngi costs"):
+        file.costs([training, rendering])
+
+
 @pytest.mark.parametrize(
     "content",
     [

@@ -1,10 +1,18 @@
 """Sizes that follow from budget and machine."""
 
+import os
+
 import pytest
 import torch
 
 from ngi.config.configuration import composed
-from ngi.machine.size import bootstrap_batches, network_depth, network_width, warmup_steps
+from ngi.machine.size import (
+    bootstrap_batches,
+    network_depth,
+    network_width,
+    usable_cores,
+    warmup_steps,
+)
 
 
 @pytest.mark.parametrize(
@@ -30,3 +38,13 @@ def test_a_gpu_gets_the_papers_network(
 ) -> None:
     monkeypatch.setattr(torch.cuda, "is_available", lambda: gpu)
     assert (network_depth(), network_width()) == size
+
+
+def test_a_pinned_process_has_the_cores_it_is_pinned_to() -> None:
+    every = os.sched_getaffinity(0)
+    try:
+        os.sched_setaffinity(0, {min(every)})
+        assert usable_cores() == 1
+    finally:
+        os.sched_setaffinity(0, every)
+    assert usable_cores() == len(every)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from contextlib import ExitStack
 from functools import partial
 
+from ngi.machine.size import usable_cores
 from ngi.machine.timing import alternated
 from ngi.studies.benchmark import PATCHES
 from ngi.studies.benchmark.batches import Batches
@@ -27,7 +27,7 @@ def throughput(
 
     What more cores would give is computed: as much per worker as the most workers gave here.
     """
-    counts = worker_counts(len(os.sched_getaffinity(0)))
+    counts = worker_counts(usable_cores())
     make = partial(Batches, scene.read, samples_per_pixel=samples_per_pixel)
     with ExitStack() as stack:
         renderers = [stack.enter_context(remote(partial(make, workers=n))) for n in counts]
