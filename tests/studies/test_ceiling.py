@@ -46,25 +46,38 @@ def test_every_run_of_a_small_study_is_done_once_and_repeats(tmp_path: Path) -> 
     again = pd.read_csv(campaign.run_all(configuration(tmp_path / "a")))
     pd.testing.assert_frame_equal(first, again)
     assert [file.stat().st_mtime_ns for file in files[2:]] == before[2:]
-
-
-def test_a_folder_of_another_study_is_refused(tmp_path: Path) -> None:
-    folder = tmp_path / "a"
-    folder.mkdir()
-    with pytest.raises(ValueError, match="multiple of 32"):
-        campaign.run_all(configuration(folder, "ceiling.pool=40"))
-    found = json.loads((folder / "provenance.json").read_text())
-    assert found["study"]["pool"] == 40
     with pytest.raises(ValueError, match="made with another study"):
-        campaign.run_all(configuration(folder))
+        campaign.run_all(configuration(tmp_path / "a", "ceiling.rounds=4"))
+    with pytest.raises(ValueError, match="made with another configuration"):
+        campaign.run_all(configuration(tmp_path / "a", "model.hidden_layers=4"))
 
 
-def test_a_size_that_leaves_no_choice_is_refused_before_anything_is_rendered(
-    tmp_path: Path,
+def test_who_renders_a_scene_and_where_it_lies_makes_no_other_study(tmp_path: Path) -> None:
+    settings = ("scene=mirror", "renderer.samples_per_pixel=8")
+    here = composed("experiment=ceiling", *settings)
+    elsewhere = composed("experiment=ceiling", *settings, "renderer.workers=3")
+    elsewhere.renderer.scene = {**here.renderer.scene, "folder": "/elsewhere/mirror"}
+    for config in (here, elsewhere):
+        campaign.claim(tmp_path, config, scene="a hash", backend="a backend")
+    found = json.loads((tmp_path / "provenance.json").read_text())
+    assert "scene" not in found["configuration"]["renderer"]
+    with pytest.raises(ValueError, match="made with another scene"):
+        campaign.claim(tmp_path, here, scene="another hash", backend="a backend")
+
+
+@pytest.mark.parametrize(
+    ("override", "named"),
+    [
+        ("ceiling.sizes=[{patches: 64, steps: 8}]", "leave no choice"),
+        ("ceiling.pool=40", "multiple of 32"),
+    ],
+)
+def test_what_makes_no_study_is_refused_before_anything_is_rendered(
+    override: str, named: str, tmp_path: Path
 ) -> None:
     folder = tmp_path / "a"
-    with pytest.raises(ValueError, match="leave no choice"):
-        campaign.run_all(configuration(folder, "ceiling.sizes=[{patches: 64, steps: 8}]"))
+    with pytest.raises(ValueError, match=named):
+        campaign.run_all(configuration(folder, override))
     assert not folder.exists()
 
 

@@ -21,7 +21,7 @@ from ngi.learn import Samples
 from ngi.machine.memory import keep_freed_memory
 from ngi.machine.provenance import provenance
 from ngi.reuse import CompactPatches
-from ngi.studies.ceiling.pool import chosen, render_pool
+from ngi.studies.ceiling.pool import check_count, chosen, render_pool
 from ngi.studies.ceiling.runs import CHUNK, Run, do, measured, plan
 from ngi.studies.ceiling.training import Training
 
@@ -45,9 +45,11 @@ def run_all(config: DictConfig) -> Path:
             seeds=study.seeds,
         )
     )
+    sampler = instantiate(config.sampler)
+    check_count(study.pool, sampler)
     keep_freed_memory()
     with closing(instantiate(config.renderer)) as renderer:
-        _claim(folder, config, scene=renderer.scene_hash, backend=renderer.description)
+        claim(folder, config, scene=renderer.scene_hash, backend=renderer.description)
         samples = build_samples(config, renderer=renderer)
         evaluator = instantiate(config.evaluation.evaluator)(
             renderer=renderer, test_inputs=samples.test_inputs
@@ -56,7 +58,7 @@ def run_all(config: DictConfig) -> Path:
         pool = render_pool(
             folder / "pool",
             samples=samples,
-            sampler=instantiate(config.sampler),
+            sampler=sampler,
             resolution=instantiate(config.resolution).resolution(0),
             count=study.pool,
         )
@@ -127,17 +129,27 @@ PARTS = (
 )
 """Of the configuration, that decide what a run of the study gives."""
 
+NOT_OF_PATCHES = ("scene", "workers", "cluster")
+"""Of the renderer's: where the scene lies, which is told by its hash, and who renders."""
+
 IN_EVERY_RUN = ("pool", "rounds", "teacher_steps")
 """Of the study's own; how many runs there are may change."""
 
 
-def _claim(folder: Path, config: DictConfig, *, scene: str, backend: str) -> None:
-    """Writes the folder's provenance, or compares it with what its runs were made with."""
+def claim(folder: Path, config: DictConfig, *, scene: str, backend: str) -> None:
+    """Writes the folder's provenance, or compares it with what its runs were made with.
+
+    scene: hash of all its files
+    Raises ValueError where they differ.
+    """
     study = plain(config.ceiling)
+    configuration = {part: plain(config[part]) for part in PARTS}
+    for key in NOT_OF_PATCHES:
+        configuration["renderer"].pop(key, None)
     made_with = {
         "scene": scene,
         "study": {key: study[key] for key in IN_EVERY_RUN},
-        "configuration": {part: plain(config[part]) for part in PARTS},
+        "configuration": configuration,
     }
     file = folder / PROVENANCE
     if not file.exists():

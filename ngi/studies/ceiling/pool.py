@@ -17,6 +17,13 @@ from ngi.reuse import CompactPatches
 BATCHES_PER_FILE = 8
 
 
+def check_count(count: int, sampler: Sampler) -> None:
+    """Raises ValueError for a number of patches that do not fill whole files."""
+    per_file = BATCHES_PER_FILE * sampler.chains
+    if count % per_file:
+        raise ValueError(f"ceiling.pool: {count}: give a multiple of {per_file}")
+
+
 def render_pool(
     folder: Path, *, samples: Samples, sampler: Sampler, resolution: int, count: int
 ) -> CompactPatches:
@@ -24,10 +31,11 @@ def render_pool(
 
     Files that are there are not rendered again: an interrupted pool goes on where it stopped, and
     may be made larger. The seed of a batch's rendering is its number.
+
+    Raises ValueError as `check_count` does.
     """
+    check_count(count, sampler)
     per_file = BATCHES_PER_FILE * sampler.chains
-    if count % per_file:
-        raise ValueError(f"ceiling.pool: {count}: give a multiple of {per_file}")
     parts = []
     for part in tqdm(range(count // per_file), desc="pool", unit=f"{per_file} patches"):
         file = folder / f"{part:05d}.pt"
