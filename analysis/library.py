@@ -49,8 +49,8 @@ class Results:
         """A row per evaluation, set, metric and statistic, with the value.
 
         Columns: step, run_seconds, set ('hard', 'uniform'), metric ('mape', 'dssim', 'mae',
-        'lpips'), statistic ('mean', 'worst5': of the worst 5 % of the frames), value (NaN where it
-        was not measured).
+        'lpips', and 'relmse', of which there is the mean alone, where it was measured), statistic
+        ('mean', 'worst5': of the worst 5 % of the frames), value (NaN where it was not measured).
         """
         columns = {
             f"{set_name}_{metric}{suffix}": (set_name, metric, statistic)
@@ -58,6 +58,7 @@ class Results:
             for metric in METRICS
             for suffix, statistic in (("", "mean"), ("_worst5", "worst5"))
         }
+        columns |= {f"{set_name}_relmse": (set_name, "relmse", "mean") for set_name in SETS}
         wide = self._tables([run.history for run in self.found])
         there = [column for column in columns if column in wide]
         tidy = wide.melt([*KEYS, "step", "run_seconds"], there, "key", "value")

@@ -13,7 +13,13 @@ from analysis.runs import METRICS, SETS
 from analysis.statistics import Estimate
 from analysis.summary import COSTS, FRAME_COST, Comparison, Summary
 
-TITLES = {"mape": "MAPE", "dssim": "DSSIM", "mae": "MAE", "lpips": "LPIPS"}
+TITLES = {
+    "mape": "MAPE",
+    "dssim": "DSSIM",
+    "mae": "MAE",
+    "lpips": "LPIPS",
+    "relmse": "noise-free relMSE",
+}
 COST_TITLES = dict(
     zip(
         (*COSTS, FRAME_COST),

@@ -10,6 +10,7 @@ from ngi.evaluate.metrics import (
     mae,
     mape,
     non_finite_pixels,
+    relmse,
     tone_map,
 )
 from ngi.evaluate.pictures import error_picture
@@ -38,5 +39,6 @@ __all__ = [
     "mape",
     "non_finite_pixels",
     "relative_noise",
+    "relmse",
     "tone_map",
 ]

@@ -71,6 +71,7 @@ class EvaluatedFrame:
     prediction: [H, W, 3] linear radiance
     floor: what a perfect prediction would score for the reference's own noise; of DSSIM and LPIPS a
         lower bound, see `Reference.radiance`
+    relmse: relative mean square error without the reference's noise
     seconds: by part: 'buffers', 'inputs' (whatever else the network is given of a frame, which may
         have to be path-traced) and 'network'
     """
@@ -80,6 +81,7 @@ class EvaluatedFrame:
     reference: Reference
     metrics: FrameMetrics
     floor: FrameMetrics
+    relmse: float
     seconds: dict[str, float]
 
     def panels(self, protocol: EvaluationProtocol) -> Panels:
@@ -106,7 +108,8 @@ class Evaluation:
     lpips_note: str | None
 
     def row(self) -> dict[str, float | int | None]:
-        """One flat row for metrics.csv: `hard_mape`, `hard_mape_worst5`, …, `hard_non_finite`, ….
+        """One flat row for metrics.csv: `hard_mape`, `hard_mape_worst5`, …, `hard_relmse`,
+        `hard_non_finite`, ….
 
         The keys never depend on the values; LPIPS is None where it is not available.
         """
@@ -117,6 +120,7 @@ class Evaluation:
                 values = _values(metrics, metric)
                 row[f"{set_name}_{metric}"] = None if values is None else mean(values)
                 row[f"{set_name}_{metric}_worst5"] = None if values is None else worst_mean(values)
+            row[f"{set_name}_relmse"] = mean(frame.relmse for frame in self._of(set_name))
             row[f"{set_name}_non_finite"] = sum(frame.non_finite for frame in metrics)
         return row
 
@@ -124,8 +128,9 @@ class Evaluation:
         """This evaluation's part of result.json: plain JSON data.
 
         protocol: {name, identity}; reference_hash; metrics: {set: {metric: {mean, worst5, floor}
-        or null}}; non_finite: {set: pixels}; frames: per frame its metrics and its reference's
-        noise and samples per pixel; frame_seconds: by part, median over the frames; lpips_note.
+        or null}}; relmse: {set: mean}; non_finite: {set: pixels}; frames: per frame its metrics,
+        relMSE, and its reference's noise and samples per pixel; frame_seconds: by part, median over
+        the frames; lpips_note.
         """
         return {
             "protocol": {"name": self.protocol.name, "identity": self.protocol.identity},
@@ -134,10 +139,12 @@ class Evaluation:
                 set_name: {metric: self._summary(set_name, metric) for metric in METRICS}
                 for set_name in SETS
             },
+            "relmse": {set_name: self.row()[f"{set_name}_relmse"] for set_name in SETS},
             "non_finite": {set_name: self.row()[f"{set_name}_non_finite"] for set_name in SETS},
             "frames": [
                 {
                     **asdict(frame.metrics),
+                    "relmse": frame.relmse,
                     "reference_noise": frame.reference.noise,
                     "reference_samples_per_pixel": frame.reference.samples_per_pixel,
                 }

@@ -14,7 +14,7 @@ from tqdm import tqdm
 
 from ngi.evaluate.evaluation import EvaluatedFrame, Evaluation, FrameMetrics
 from ngi.evaluate.lpips_metric import Lpips
-from ngi.evaluate.metrics import image_metrics, non_finite_pixels
+from ngi.evaluate.metrics import image_metrics, non_finite_pixels, relmse
 from ngi.evaluate.protocol import EvaluationProtocol, Frame, evaluation_frames
 from ngi.evaluate.references import Reference, ReferenceCache
 from ngi.render.protocol import Renderer
@@ -149,6 +149,7 @@ class Evaluator:
             reference=prepared.reference,
             metrics=self._measure(prepared.frame, prediction, prepared.reference.radiance),
             floor=prepared.floor,
+            relmse=relmse(prediction, prepared.reference.half_a, prepared.reference.half_b),
             seconds=seconds,
         )
 

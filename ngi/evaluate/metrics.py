@@ -1,7 +1,7 @@
 """Error metrics of one image against its reference (paper, Sec. 7.2.1).
 
 MAPE and MAE compare linear radiance, DSSIM and LPIPS tone-mapped sRGB. Values that are NaN or Inf
-are never hidden: they make each of the four metrics NaN or Inf.
+are never hidden: they make each of the four metrics, and relMSE, NaN or Inf.
 """
 
 from typing import TypedDict
@@ -21,6 +21,28 @@ def mape(prediction: Tensor, reference: Tensor, epsilon: float) -> float:
     """
     _check_shapes(prediction, reference)
     return (_difference(prediction, reference) / (reference.double() + epsilon)).mean().item()
+
+
+RELMSE_EPSILON = 0.01
+"""Of relMSE's denominator, in squared linear radiance; the field's usual one."""
+
+
+def relmse(prediction: Tensor, half_a: Tensor, half_b: Tensor) -> float:
+    """Relative mean square error that the reference's noise does not add to; below 0 by chance.
+
+    The mean of (p - a)(p - b) / (r² + 0.01) with r = (a + b) / 2 for independent halves a and b of
+    the reference's samples: (p - r)² - ((a - b) / 2)², whose second term is the noise of r. The
+    other metrics cannot fall below that noise; this one goes on falling. What noise does to the
+    denominator remains: where r deviates by σ r from the truth, a prediction that is too bright by
+    e r counts e² + 4 e σ², one that is too dark as much less.
+
+    prediction, half_a, half_b: [H, W, 3] linear radiance.
+    """
+    _check_shapes(prediction, half_a)
+    _check_shapes(half_a, half_b)
+    p, a, b = prediction.double(), half_a.double(), half_b.double()
+    reference = 0.5 * (a + b)
+    return ((p - a) * (p - b) / (reference * reference + RELMSE_EPSILON)).mean().item()
 
 
 def mae(prediction: Tensor, reference: Tensor) -> float:

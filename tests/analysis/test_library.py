@@ -43,6 +43,18 @@ def test_evaluations_are_a_value_a_row(folder) -> None:
     assert rows["run_seconds"].tolist() == run.history["run_seconds"].tolist()
 
 
+def test_relmse_is_there_where_it_was_measured(folder) -> None:
+    for file in folder.glob("mirror/*/seed=1/metrics.csv"):
+        table = pd.read_csv(file)
+        table["hard_relmse"] = -0.125 * table["step"]
+        table.to_csv(file, index=False)
+    found = load_runs(folder).evaluations.query("metric == 'relmse'").dropna()
+    assert set(zip(found["scene"], found["seed"], strict=True)) == {("mirror", 1)}
+    assert set(found["set"]) == {"hard"}
+    assert set(found["statistic"]) == {"mean"}
+    assert (found["value"] == -0.125 * found["step"]).all()
+
+
 def test_frames_are_a_value_a_row(folder) -> None:
     results = load_runs(folder)
     run = next(r for r in results.found if (r.scene, r.method, r.seed) == ("mirror", "uniform", 1))

@@ -61,6 +61,23 @@ def test_report_writes_everything_it_names(two_scenes, capsys) -> None:
     ElementTree.parse(report / "error_mirror.svg")
 
 
+def test_relmse_is_drawn_where_all_runs_of_a_scene_have_it(two_scenes) -> None:
+    for number, file in enumerate(sorted(two_scenes.rglob("metrics.csv"))):
+        if file.is_relative_to(two_scenes / "mirror") or number % 2:
+            table = pd.read_csv(file)
+            for name in ("hard", "uniform"):
+                table[f"{name}_relmse"] = 0.01 / (1 + table["step"])
+            table.to_csv(file, index=False)
+    assert main([str(two_scenes)]) == 0
+    drawn = {
+        scene: (two_scenes / "report" / f"error_{scene}.svg").read_text()
+        for scene in ("mirror", "sphere-caustic")
+    }
+    assert drawn["mirror"].count("noise-free relMSE") == 2
+    assert "noise-free relMSE" not in drawn["sphere-caustic"]
+    assert drawn["sphere-caustic"].count("LPIPS") == 2
+
+
 def test_comparison_sheets_show_reference_and_both_methods(one_scene, tmp_path) -> None:
     assert main([str(one_scene), "--output", str(tmp_path / "out")]) == 0
     pictures = tmp_path / "out" / "pictures"

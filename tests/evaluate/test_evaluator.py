@@ -55,6 +55,21 @@ def test_perfect_prediction_scores_the_floor(evaluator) -> None:
         assert dssim["floor"] < dssim["mean"] < 3 * dssim["floor"]
 
 
+def test_relmse_is_that_of_the_truth_whatever_the_references_noise(evaluator, renderer) -> None:
+    def brighter(buffers: torch.Tensor, _: torch.Tensor) -> torch.Tensor:
+        return torch.log1p(1.2 * buffers)
+
+    result = evaluator.evaluate(brighter).result()
+    truths = [renderer.truth(v, evaluator.protocol.resolution) for v in renderer.hard_frames()]
+    expected = [((0.2 * r) ** 2 / (r**2 + 0.01)).mean().item() for r in truths]
+    found = [frame["relmse"] for frame in result["frames"] if frame["set"] == "hard"]
+    assert found == pytest.approx(expected, rel=0.1)
+    assert result["relmse"]["hard"] == pytest.approx(np.mean(expected), rel=0.03)
+    assert evaluator.evaluate(brighter).row()["hard_relmse"] == result["relmse"]["hard"]
+    perfectly = evaluator.evaluate(perfect).result()
+    assert abs(perfectly["relmse"]["hard"]) < 0.001 < perfectly["metrics"]["hard"]["mape"]["floor"]
+
+
 def test_values_are_those_of_the_metrics(evaluator, renderer, protocol, tmp_path) -> None:
     evaluation = evaluator.evaluate(lambda b, v: torch.log1p(b * (1 + v[0])))
     result = evaluation.result()
@@ -191,7 +206,7 @@ def test_row_and_result_can_be_written_and_have_fixed_keys(evaluator, tmp_path) 
         for name in SETS
         for key in (
             *(f"{name}_{m}{suffix}" for m in METRICS for suffix in ("", "_worst5")),
-            f"{name}_non_finite",
+            *(f"{name}_relmse", f"{name}_non_finite"),
         )
     ]
     assert list(row) == expected

@@ -4,7 +4,7 @@ import torch
 from skimage import color
 from skimage.metrics import structural_similarity
 
-from ngi.evaluate import dssim, mae, mape, non_finite_pixels, tone_map
+from ngi.evaluate import dssim, mae, mape, non_finite_pixels, relmse, tone_map
 
 SIZES = [(11, 11), (13, 37), (64, 65)]
 
@@ -64,6 +64,46 @@ def test_relative_error_of_a_black_reference_is_relative_to_epsilon() -> None:
     assert mape(torch.full((4, 4, 3), 0.02), black, 0.01) == pytest.approx(2.0)
 
 
+def test_relmse_of_a_reference_without_noise_is_that_of_numpy() -> None:
+    x, y = images(16, 24)
+    p, r = x.double().numpy(), y.double().numpy()
+    assert relmse(x, y, y) == pytest.approx(np.mean((p - r) ** 2 / (r**2 + 0.01)), rel=1e-12)
+
+
+def relmse_with_and_without_noise(error: torch.Tensor) -> tuple[float, float, float]:
+    """Of a prediction that is so much too bright; of it without, with halved and all the noise."""
+    generator = torch.Generator().manual_seed(0)
+    truth = 0.5 + torch.rand(256, 256, 3, generator=generator)
+    a, b = truth * (1 + 0.1 * torch.randn(2, 256, 256, 3, generator=generator))
+    mean = 0.5 * (a + b)
+    prediction = truth * (1 + error)
+    pairs = ((truth, truth), (a, b), (mean, mean))
+    without, halved, noisy = (relmse(prediction, *pair) for pair in pairs)
+    return without, halved, noisy
+
+
+@pytest.mark.parametrize("error", [0.0, 0.03, 0.1])
+def test_the_references_noise_adds_next_to_nothing_to_relmse(error: float) -> None:
+    signs = torch.arange(256).div(8, rounding_mode="floor") % 2 * 2.0 - 1
+    stripes = error * signs.view(1, 256, 1)
+    without, halved, noisy = relmse_with_and_without_noise(stripes)
+    assert noisy - without == pytest.approx(0.1**2 / 2, rel=0.1)
+    assert abs(halved - without) < 0.1 * (noisy - without)
+
+
+def test_what_is_too_bright_everywhere_has_that_share_of_the_noise_in_relmse() -> None:
+    error = 0.1
+    without, halved, _ = relmse_with_and_without_noise(torch.tensor(error))
+    assert halved - without == pytest.approx(4 * error * 0.1**2 / 2, rel=0.25)
+
+
+def test_relmse_sees_the_worst_of_bright_and_dark_alike() -> None:
+    """A lamp that is missing counts 1, one in the dark where none is by its own square."""
+    lamp, dark = torch.full((2, 2, 3), 100.0), torch.zeros(2, 2, 3)
+    assert relmse(dark, lamp, lamp) == pytest.approx(1, rel=1e-5)
+    assert relmse(lamp, dark, dark) == pytest.approx(100**2 / 0.01)
+
+
 def test_equal_images_have_no_error() -> None:
     x, _ = images(16, 16)
     assert (mape(x, x, 0.01), mae(x, x), dssim(x, x)) == (0.0, 0.0, pytest.approx(0.0, abs=1e-12))
@@ -99,12 +139,15 @@ def test_values_that_are_not_finite_are_not_hidden(bad: float) -> None:
     x, y = images(16, 16)
     x[3, 4, 1] = bad
     assert non_finite_pixels(x) == 1
-    for value in (mape(x, y, 0.01), mae(x, y), dssim(tone_map(x), tone_map(y))):
+    errors = (mape(x, y, 0.01), mae(x, y), dssim(tone_map(x), tone_map(y)), relmse(x, y, y))
+    for value in errors:
         assert not np.isfinite(value)
 
 
 def test_errors_name_the_shapes() -> None:
     with pytest.raises(ValueError, match=r"\[4, 5, 3\].*\[5, 4, 3\]"):
         mae(torch.zeros(4, 5, 3), torch.zeros(5, 4, 3))
+    with pytest.raises(ValueError, match=r"\[5, 4, 3\].*\[4, 5, 3\]"):
+        relmse(torch.zeros(5, 4, 3), torch.zeros(5, 4, 3), torch.zeros(4, 5, 3))
     with pytest.raises(ValueError, match="window of 11 pixels"):
         dssim(torch.zeros(10, 20, 3), torch.zeros(10, 20, 3))
