@@ -20,8 +20,11 @@ ERRORS = {
     "hard_error": "hard frames",
     "uniform_error": "uniform frames",
     "hard_tail": "worst 5 % of pixels, hard frames",
+    "hard_relmse": "noise-free relMSE, hard frames",
+    "uniform_relmse": "noise-free relMSE, uniform frames",
 }
-"""Columns of a run: geometric means of the four metrics, and a tail of log1p radiance."""
+"""Columns of a run: geometric means of the four metrics, a tail of log1p radiance, and relMSE
+without the references' noise, which runs of before it was measured lack."""
 
 NO_CHOICE = "all patches"
 """Uniform choice of the whole pool: what no unbiased choice of fewer patches can go beyond."""
@@ -52,6 +55,7 @@ def differences(runs: pd.DataFrame) -> pd.DataFrame:
     """
     rows = []
     runs = runs.assign(pair=runs.groupby(["scene", "seed"]).ngroup())
+    errors = [error for error in ERRORS if error in runs]
     everywhere = runs.assign(scene=EVERYWHERE)
     both = pd.concat([runs, everywhere]) if runs["scene"].nunique() > 1 else runs
     for (scene, steps), of_steps in both.groupby(["scene", "steps"], sort=False):
@@ -60,7 +64,7 @@ def differences(runs: pd.DataFrame) -> pd.DataFrame:
         for patches in sorted(compared):
             here = pd.concat([of_steps[of_steps["patches"] == patches], everything])
             for choice in [c for c in here["choice"].unique() if c != BASELINE]:
-                for error in ERRORS:
+                for error in errors:
                     uniform = _by_pair(here, BASELINE, error)
                     found = paired_difference(uniform, _by_pair(here, choice, error))
                     if found is None:
@@ -112,7 +116,7 @@ def concentration(runs: pd.DataFrame) -> Table:
 
 
 def _by_pair(runs: pd.DataFrame, choice: str, error: str) -> dict[int, float]:
-    chosen = runs[runs["choice"] == choice]
+    chosen = runs[runs["choice"] == choice].dropna(subset=[error])
     return dict(zip(chosen["pair"], chosen[error], strict=True))
 
 
@@ -141,7 +145,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     found = differences(runs)
     runs.to_csv(output / "runs.csv", index=False, float_format="%.6g")
     found.to_csv(output / "differences.csv", index=False, float_format="%.4g")
-    tables = [*(table(found, error) for error in ERRORS), concentration(runs)]
+    tables = [*(table(found, error) for error in found["error"].unique()), concentration(runs)]
     text = "\n\n".join(map(to_markdown, tables)) + "\n"
     (output / "tables.md").write_text(text)
     print(text)

@@ -64,6 +64,22 @@ def test_all_scenes_together_have_a_pair_per_scene_and_seed(tmp_path: Path) -> N
     assert (row["difference"], row["seeds"]) == (pytest.approx((-0.1 - 0.2 + 0.1) / 3), 3)
 
 
+def test_relmse_is_compared_where_it_was_measured(tmp_path: Path) -> None:
+    study(tmp_path)
+    assert set(differences(read_runs(tmp_path))["error"]) == {
+        *("hard_error", "uniform_error", "hard_tail")
+    }
+    for file in (tmp_path / "room").rglob("*.csv"):
+        runs = pd.read_csv(file)
+        file.write_text(runs.assign(hard_relmse=runs["hard_error"] ** 2).to_csv(index=False))
+    found = differences(read_runs(tmp_path))
+    row = only(found, scene="room", choice="oracle", error="hard_relmse")
+    assert row["difference"] == pytest.approx((0.9**2 + 0.8**2) / 2 - 1)
+    assert only(found, scene=EVERYWHERE, choice="oracle", error="hard_relmse")["seeds"] == 2
+    assert main([str(tmp_path)]) == 0
+    assert "noise-free relMSE, hard frames" in (tmp_path / "tables.md").read_text()
+
+
 def test_how_concentrated_the_error_is_after_uniform_choice(tmp_path: Path) -> None:
     study(tmp_path)
     rows = [[cell.text for cell in row] for row in concentration(read_runs(tmp_path)).rows]

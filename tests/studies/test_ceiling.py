@@ -40,6 +40,7 @@ def test_every_run_of_a_small_study_is_done_once_and_repeats(tmp_path: Path) -> 
     assert list(first["patches"]) == [16, 16, 16, 64]
     assert (first[["hard_error", "uniform_error", "hard_tail"]] > 0).all(axis=None)
     assert first["hard_error"].nunique() == 4
+    assert (first["hard_relmse"] > 0).all()  # there is no noise, and much to learn
     files = sorted((tmp_path / "a" / "runs").iterdir())
     before = [file.stat().st_mtime_ns for file in files]
     files[1].unlink()

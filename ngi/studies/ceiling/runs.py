@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor
 
-from ngi.evaluate import METRICS, SETS, Evaluation, Evaluator
+from ngi.evaluate import METRICS, SETS, EvaluatedFrame, Evaluation, Evaluator
+from ngi.evaluate.evaluation import mean
 from ngi.explore import Importance
 from ngi.learn.new_losses import worst, worst_share
 from ngi.reuse import CompactPatches
@@ -106,7 +107,7 @@ def true_errors(
 
 
 def measured(evaluation: Evaluation) -> dict[str, float]:
-    """Per set: every metric, their geometric mean as `SET_error`, and `SET_tail`.
+    """Per set: every metric, their geometric mean as `SET_error`, `SET_relmse` and `SET_tail`.
 
     The tail is the mean absolute difference of log1p radiance over the worst 5 % of all pixels.
     """
@@ -117,17 +118,18 @@ def measured(evaluation: Evaluation) -> dict[str, float]:
         known = [float(value) for value in values.values() if value is not None]
         result |= {f"{name}_{metric}": float(v) for metric, v in values.items() if v is not None}
         result[f"{name}_error"] = math.exp(sum(math.log(value) for value in known) / len(known))
-        result[f"{name}_tail"] = _tail(evaluation, name)
+        of_set = [frame for frame in evaluation.frames if frame.frame.set == name]
+        result[f"{name}_relmse"] = mean(frame.relmse for frame in of_set)
+        result[f"{name}_tail"] = _tail(of_set)
     return result
 
 
-def _tail(evaluation: Evaluation, name: str) -> float:
+def _tail(frames: Iterable[EvaluatedFrame]) -> float:
     log: Callable[[Tensor], Tensor] = lambda radiance: radiance.clamp(min=0).log1p()  # noqa: E731
     errors = torch.cat(
         [
             (log(each.prediction) - log(each.reference.radiance)).abs().mean(dim=-1).flatten()
-            for each in evaluation.frames
-            if each.frame.set == name
+            for each in frames
         ]
     )
     return worst(errors).mean().item()
