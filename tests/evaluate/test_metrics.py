@@ -70,6 +70,15 @@ def test_relmse_of_a_reference_without_noise_is_that_of_numpy() -> None:
     assert relmse(x, y, y) == pytest.approx(np.mean((p - r) ** 2 / (r**2 + 0.01)), rel=1e-12)
 
 
+def test_relmse_leaves_out_the_worst_pixel_of_a_thousand() -> None:
+    x, y = images(40, 50)
+    expected = relmse(x, y, y)
+    x[3, 4], x[30, 9] = 1000.0, 1000.0  # two of 2,000
+    assert relmse(x, y, y) == pytest.approx(expected, rel=0.05)
+    x[5, 6] = 1000.0
+    assert relmse(x, y, y) > 100 * expected
+
+
 def relmse_with_and_without_noise(error: torch.Tensor) -> tuple[float, float, float]:
     """Of a prediction that is so much too bright; of it without, with halved and all the noise."""
     generator = torch.Generator().manual_seed(0)
