@@ -171,9 +171,8 @@ def _draw(axes: Axes, panel: ErrorPanel, styles: Mapping[str, dict[str, Any]]) -
         axes.set(xticks=[], yticks=[])
         return
     values = np.concatenate([array for c in curves for array in (c.mean, c.low, c.high)])
-    floor = None
-    if panel.metric != RELMSE:
-        floor = panel.runs[0].metric(panel.set_name, panel.metric, "floor")
+    has_floor = panel.metric != RELMSE
+    floor = panel.runs[0].metric(panel.set_name, panel.metric, "floor") if has_floor else None
     if floor is not None:
         axes.axhline(
             floor, color="#666666", linestyle=(0, (4, 3)), linewidth=1, label="reference noise"
