@@ -10,7 +10,7 @@ from pathlib import Path
 import pandas as pd
 
 from analysis.methods import name_methods
-from analysis.runs import METRICS, SETS, Run, find_runs
+from analysis.runs import METRICS, RELMSE, SETS, Run, find_runs
 from analysis.step_log import read_steps
 
 KEYS = ["scene", "method", "seed"]
@@ -58,7 +58,7 @@ class Results:
             for metric in METRICS
             for suffix, statistic in (("", "mean"), ("_worst5", "worst5"))
         }
-        columns |= {f"{set_name}_relmse": (set_name, "relmse", "mean") for set_name in SETS}
+        columns |= {f"{set_name}_{RELMSE}": (set_name, RELMSE, "mean") for set_name in SETS}
         wide = self._tables([run.history for run in self.found])
         there = [column for column in columns if column in wide]
         tidy = wide.melt([*KEYS, "step", "run_seconds"], there, "key", "value")

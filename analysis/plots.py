@@ -17,7 +17,7 @@ from matplotlib.ticker import FuncFormatter, Locator, LogLocator, MaxNLocator, N
 
 from analysis.curves import Curve, error_curve
 from analysis.methods import methods_in_order, title
-from analysis.runs import METRICS, SETS, Run
+from analysis.runs import METRICS, RELMSE, SETS, Run
 from analysis.tables import TITLES
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -25,9 +25,6 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 
 DASHES = ("-", (0, (5, 1.5)), (0, (1, 1.2)))
 """From the eighth method on, colours come again with another line style."""
-
-RELMSE = "relmse"
-"""No metric of the paper's: it has no floor, and is missing in runs of before it was measured."""
 
 LOG_RATIO = 4.0
 """From this ratio of largest to smallest value on, ticks stand at 1, 2, 5, 10, …"""
@@ -101,7 +98,7 @@ class ErrorPanel:
 
 def scene_panels(runs: Sequence[Run], set_name: str, *, log_time: bool = False) -> list[ErrorPanel]:
     """A panel per metric for the runs of one scene, and one of relMSE where all have it."""
-    measured = all(f"{set_name}_{RELMSE}" in run.history for run in runs)
+    measured = all(f"{name}_{RELMSE}" in run.history for run in runs for name in SETS)
     return [
         ErrorPanel(f"{TITLES[metric]}, {set_name} frames", runs, set_name, metric, log_time)
         for metric in (*METRICS, *([RELMSE] if measured else []))
@@ -171,8 +168,7 @@ def _draw(axes: Axes, panel: ErrorPanel, styles: Mapping[str, dict[str, Any]]) -
         axes.set(xticks=[], yticks=[])
         return
     values = np.concatenate([array for c in curves for array in (c.mean, c.low, c.high)])
-    has_floor = panel.metric != RELMSE
-    floor = panel.runs[0].metric(panel.set_name, panel.metric, "floor") if has_floor else None
+    floor = panel.runs[0].metric(panel.set_name, panel.metric, "floor")
     if floor is not None:
         axes.axhline(
             floor, color="#666666", linestyle=(0, (4, 3)), linewidth=1, label="reference noise"

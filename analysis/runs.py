@@ -20,14 +20,17 @@ from analysis.run_checks import (
     read_table,
 )
 
-__all__ = ["DISTINCTIONS", "METRICS", "SETS", "Run", "check_comparable", "comparison_warnings"]
-__all__ += ["find_runs"]
+__all__ = ["DISTINCTIONS", "METRICS", "RELMSE", "SETS", "Run", "check_comparable"]
+__all__ += ["comparison_warnings", "find_runs"]
 
 SCHEMA_VERSION = 1
 """Of the result files this program understands."""
 
 MOST_TIME_APART = 0.05
 """Relative difference of run times up to which runs count as given the same time."""
+
+RELMSE = "relmse"
+"""Measured beside the paper's metrics; runs of before it was lack it."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +66,13 @@ class Run:
         return self.result.get("commits") or [last]
 
     def metric(self, set_name: str, metric: str, statistic: str = "mean") -> float | None:
-        """One metric at the end of the run; statistic is mean, worst5 or floor; None if missing."""
+        """One metric at the end of the run; statistic is mean, worst5 or floor; None if missing.
+
+        Of `RELMSE` there is the mean alone: it has no floor.
+        """
+        if metric == RELMSE:
+            found: float | None = self.result.get(RELMSE, {}).get(set_name)
+            return found if statistic == "mean" else None
         summary = self.result["metrics"][set_name][metric]
         return None if summary is None else summary[statistic]
 

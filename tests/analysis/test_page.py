@@ -203,6 +203,19 @@ def test_the_same_runs_make_the_same_files(plain, tmp_path) -> None:
         assert (tmp_path / file).read_bytes() == (plain.output / file).read_bytes(), file
 
 
+def test_relmse_has_a_curve_where_it_was_measured(make_run, tmp_path) -> None:
+    folder = make_run(change=lambda result: result.update(relmse={"hard": 0.0125, "uniform": 0.5}))
+    table = pd.read_csv(folder / "metrics.csv")
+    table.assign(hard_relmse=0.0125, uniform_relmse=0.5).to_csv(folder / "metrics.csv", index=False)
+    page = page_of(tmp_path / "runs", tmp_path / "report")
+    alts = [str(image["alt"]) for image in page.all("img")]
+    (hard,) = {alt for alt in alts if alt.startswith("noise-free relMSE on hard")}
+    assert hard.startswith("noise-free relMSE on hard frames of mirror against run time; at the")
+    assert hard.endswith("0.0125")
+    (uniform,) = {alt for alt in alts if alt.startswith("noise-free relMSE on uniform")}
+    assert float(uniform.rpartition(" ")[2]) == 0.5
+
+
 def test_what_it_shows_is_escaped(make_run, tmp_path) -> None:
     name = '<img src=x onerror="alert(1)">&amp;'
     make_run(sampler=name)
