@@ -132,6 +132,7 @@ class Evaluation:
         relMSE, and its reference's noise and samples per pixel; frame_seconds: by part, median over
         the frames; lpips_note.
         """
+        row = self.row()
         return {
             "protocol": {"name": self.protocol.name, "identity": self.protocol.identity},
             "reference_hash": self.reference_hash,
@@ -139,8 +140,8 @@ class Evaluation:
                 set_name: {metric: self._summary(set_name, metric) for metric in METRICS}
                 for set_name in SETS
             },
-            "relmse": {set_name: self.row()[f"{set_name}_relmse"] for set_name in SETS},
-            "non_finite": {set_name: self.row()[f"{set_name}_non_finite"] for set_name in SETS},
+            "relmse": {set_name: row[f"{set_name}_relmse"] for set_name in SETS},
+            "non_finite": {set_name: row[f"{set_name}_non_finite"] for set_name in SETS},
             "frames": [
                 {
                     **asdict(frame.metrics),

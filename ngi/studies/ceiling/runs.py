@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor
 
-from ngi.evaluate import METRICS, SETS, EvaluatedFrame, Evaluation, Evaluator
-from ngi.evaluate.evaluation import mean
+from ngi.evaluate import METRICS, SETS, Evaluation, Evaluator
 from ngi.explore import Importance
 from ngi.learn.new_losses import worst, worst_share
 from ngi.reuse import CompactPatches
@@ -114,22 +113,21 @@ def measured(evaluation: Evaluation) -> dict[str, float]:
     row = evaluation.row()
     result: dict[str, float] = {}
     for name in SETS:
-        values = {metric: row[f"{name}_{metric}"] for metric in METRICS}
-        known = [float(value) for value in values.values() if value is not None]
-        result |= {f"{name}_{metric}": float(v) for metric, v in values.items() if v is not None}
+        keys = [f"{name}_{metric}" for metric in (*METRICS, "relmse")]
+        result |= {key: float(value) for key in keys if (value := row[key]) is not None}
+        known = [result[key] for key in keys[: len(METRICS)] if key in result]
         result[f"{name}_error"] = math.exp(sum(math.log(value) for value in known) / len(known))
-        of_set = [frame for frame in evaluation.frames if frame.frame.set == name]
-        result[f"{name}_relmse"] = mean(frame.relmse for frame in of_set)
-        result[f"{name}_tail"] = _tail(of_set)
+        result[f"{name}_tail"] = _tail(evaluation, name)
     return result
 
 
-def _tail(frames: Iterable[EvaluatedFrame]) -> float:
+def _tail(evaluation: Evaluation, name: str) -> float:
     log: Callable[[Tensor], Tensor] = lambda radiance: radiance.clamp(min=0).log1p()  # noqa: E731
     errors = torch.cat(
         [
             (log(each.prediction) - log(each.reference.radiance)).abs().mean(dim=-1).flatten()
-            for each in frames
+            for each in evaluation.frames
+            if each.frame.set == name
         ]
     )
     return worst(errors).mean().item()
