@@ -7,6 +7,7 @@ from collections import defaultdict
 import torch
 from torch import Tensor
 
+from ngi.machine.precision import multiplies_bfloat16
 from ngi.models.muon_step import RMS
 
 
@@ -48,16 +49,23 @@ class BatchedMuon(torch.optim.Muon):
 def orthogonalised(
     matrices: Tensor, *, coefficients: tuple[float, float, float], steps: int, epsilon: float
 ) -> Tensor:
-    """[n, rows, columns] with singular values near 1, in bfloat16: Newton-Schulz iterations.
+    """[n, rows, columns] with singular values near 1: Newton-Schulz iterations.
+
+    They need no more than bfloat16, and are in float32 where a processor would emulate that: 10
+    in place of 105 ms for the networks of ours.
 
     coefficients: a, b, c of X ← aX + (bA + cA²)X, A = XXᵀ (Jordan et al. 2024)
     steps: number of iterations; epsilon: least norm that a matrix is divided by
     """
     a, b, c = coefficients
     wide = matrices.shape[1] <= matrices.shape[2]
-    x = (matrices if wide else matrices.mT).bfloat16()
+    x = (matrices if wide else matrices.mT).to(_precision(matrices.device.type))
     x = x / torch.linalg.vector_norm(x, dim=(1, 2), keepdim=True).clamp(min=epsilon)
     for _ in range(steps):
         gram = x @ x.mT
         x = torch.baddbmm(x, torch.baddbmm(gram, gram, gram, beta=b, alpha=c), x, beta=a)
     return x if wide else x.mT
+
+
+def _precision(device: str) -> torch.dtype:
+    return torch.bfloat16 if multiplies_bfloat16(device) else torch.float32

@@ -8,6 +8,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
+from ngi.machine.precision import multiplies_bfloat16
 from ngi.models.patch_linear import PatchLinear, in_precision
 
 ALIGNMENT = 8
@@ -75,5 +76,5 @@ def computed_by_onednn(precision: torch.dtype) -> bool:
     if torch.compiler.is_compiling():  # a file for other programs knows standard operators only
         return False
     if precision == torch.bfloat16:
-        return bool(torch.ops.mkldnn._is_mkldnn_bf16_supported())
+        return multiplies_bfloat16("cpu")
     return precision == torch.float32 and torch.backends.mkldnn.is_available()

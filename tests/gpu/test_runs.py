@@ -88,7 +88,10 @@ def assert_close(a: Path, b: Path) -> None:
 
 
 @pytest.mark.parametrize("name", RUNS)
-def test_a_run_on_the_gpu_is_that_on_the_cpu(tmp_path: Path, name: str) -> None:
+def test_a_run_on_the_gpu_is_that_on_the_cpu(
+    tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("ngi.models.batched_muon.multiplies_bfloat16", lambda _: True)
     trained(tmp_path / "cpu", *RUNS[name])
     with pretended_gpu() as ledger:
         result = trained(tmp_path / "gpu", *RUNS[name])

@@ -3,12 +3,13 @@
 import copy
 import io
 
+import numpy as np
 import pytest
 import torch
 from torch import nn
 
 from ngi.models import MuonAdam
-from ngi.models.batched_muon import BatchedMuon
+from ngi.models.batched_muon import BatchedMuon, orthogonalised
 
 SHAPES = {  # shape -> who steps it
     (24, 16): "muon",
@@ -46,6 +47,13 @@ def ours(parameters: list[nn.Parameter], clip_norm: float = 2.0) -> MuonAdam:
     return MuonAdam(parameters, lr=0.01, adam_lr=0.003, momentum=0.9, clip_norm=clip_norm)
 
 
+@pytest.fixture
+def bfloat16(monkeypatch: pytest.MonkeyPatch) -> None:
+    """PyTorch's Muon works in it on every processor, ours on those with units for it."""
+    monkeypatch.setattr("ngi.models.batched_muon.multiplies_bfloat16", lambda _: True)
+
+
+@pytest.mark.usefixtures("bfloat16")
 @pytest.mark.parametrize("size", [1e-3, 1.0])
 def test_steps_as_muon_and_adam_do_each_on_their_own(size: float) -> None:
     mine, theirs = parameters(), parameters()
@@ -72,6 +80,7 @@ def alike(a: torch.Tensor, b: torch.Tensor, lr: float) -> bool:
     return bool((a - b).norm() <= 0.02 * step)
 
 
+@pytest.mark.usefixtures("bfloat16")
 def test_matrices_of_one_shape_step_together_as_each_on_its_own() -> None:
     generator = torch.Generator().manual_seed(2)
     shapes = [(24, 24), (40, 16), (24, 24), (16, 40), (40, 16), (24, 24)]
@@ -91,6 +100,25 @@ def test_matrices_of_one_shape_step_together_as_each_on_its_own() -> None:
         for o in optimizers
     )
     assert all(torch.equal(a, b) for a, b in zip(*momenta, strict=True))
+
+
+@pytest.mark.parametrize(("units", "error"), [(True, 0.02), (False, 1e-4)])
+@pytest.mark.parametrize("shape", [(24, 16), (16, 24), (12, 12)])
+def test_singular_values_go_through_the_polynomials_and_vectors_stay(
+    units: bool, error: float, shape: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("ngi.models.batched_muon.multiplies_bfloat16", lambda _: units)
+    matrices = torch.randn((3, *shape), generator=torch.Generator().manual_seed(4))
+    coefficients = a, b, c = 3.4445, -4.775, 2.0315
+    found = orthogonalised(matrices, coefficients=coefficients, steps=5, epsilon=1e-7)
+    left, values, right = np.linalg.svd(matrices.double().numpy(), full_matrices=False)
+    values /= np.linalg.norm(values, axis=1, keepdims=True)
+    for _ in range(5):
+        values = a * values + b * values**3 + c * values**5
+    expected = (left * values[:, None]) @ right
+    assert found.dtype == (torch.bfloat16 if units else torch.float32)
+    deviation = np.linalg.norm(found.double().numpy() - expected) / np.linalg.norm(expected)
+    assert deviation < error
 
 
 def test_clipping_is_of_the_gradient_of_all_parameters_together() -> None:
