@@ -113,7 +113,10 @@ def photon_points() -> list[mi.Float]:
     """
     points = SobolEngine(5).draw(PHOTONS).double().numpy() + 0.5 / PHOTONS
     points = points[points[:, 0].argsort()]  # side by side, those of a shape take the same way
-    numbers = [mi.Float(column) for column in points.T]
+    # Copied into Dr.Jit's memory: how NumPy aligns its own is compiled into kernels, so that those
+    # of one process would not be found again by the next.
+    flat, every = mi.Float(points.ravel()), dr.arange(mi.UInt32, PHOTONS)
+    numbers = [dr.gather(mi.Float, flat, 5 * every + dimension) for dimension in range(5)]
     dr.eval(numbers)
     return numbers
 

@@ -108,7 +108,9 @@ def load(document: SceneFile) -> mi.Scene:
             raise ValueError(f"{place}: {name} names no file; give it <string name='filename' …/>")
     ElementTree.indent(absolute, space="")  # a tag per line, by which Mitsuba's place is known
     text = ElementTree.tostring(absolute, encoding="unicode")
+    # Side by side, materials would get their numbers in another order each time, and those are
+    # compiled into kernels, which the next process would not find again.
     try:
-        return mi.load_string(text, optimize=False)
+        return mi.load_string(text, optimize=False, parallel=False)
     except RuntimeError as error:
         raise ValueError(in_words(str(error), text, copied)) from error
