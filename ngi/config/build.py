@@ -42,7 +42,7 @@ def build_stream(
         sampler=instantiate(config.sampler),
         reuse=Reuse(
             store=instantiate(config.reuse.store)(
-                layout=samples.layout, device=_training_device(config)
+                layout=samples.layout, device=training_device(config)
             ),
             archive=PatchArchive(patches),
             policy=reuse_policy(config, samples_per_pixel=renderer.samples_per_pixel),
@@ -178,7 +178,7 @@ def run_costs(
     return learn.CostFile(Path(budget.costs)).costs(run_components(config, renderer=renderer))
 
 
-def _training_device(config: DictConfig) -> str:
+def training_device(config: DictConfig) -> str:
     """Where Lightning's trainer trains."""
     import torch
 

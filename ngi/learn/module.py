@@ -98,7 +98,8 @@ class IlluminationModule(LightningModule):
                 "choose bf16-mixed (trainer=bf16) or 32-true (trainer=fp32)"
             )
         if isinstance(self.trainer, GraphTrainer):
-            self._record()
+            self.record()
+            self.learner = replace(self.learner, before=self._before())
 
     def training_step(self, batch: Batch, batch_idx: int) -> dict[str, Step]:  # noqa: ARG002
         """Takes the step, and hands `Step` to the callbacks under the key 'step'."""
@@ -136,10 +137,11 @@ class IlluminationModule(LightningModule):
         with self.trainer.precision_plugin.forward_context():
             return self._scorer_of(target).signals(patches.to(self.device), self._optimizer())
 
-    def _record(self) -> None:
+    def record(self) -> None:
+        """From here on, passes of training steps and images are CUDA graphs, on a GPU."""
         precision = self.trainer.precision_plugin.forward_context
         captured = CapturedPass(self.network, self.loss, precision=precision)
-        self.learner = replace(self.learner, captured=captured, before=self._before())
+        self.learner = replace(self.learner, captured=captured)
         self._image = Captured(self._rendered, module=self._shown, name="images")
 
     def _before(self) -> StateBefore | None:

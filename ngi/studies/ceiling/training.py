@@ -13,9 +13,10 @@ from torch import Tensor
 
 from ngi import learn
 from ngi.clock.counters import Counters
-from ngi.config.build import build_module
+from ngi.config.build import build_module, training_device
 from ngi.explore import ConstantTarget
 from ngi.learn import Batch
+from ngi.learn.graph_trainer import GraphTrainer
 from ngi.patches import Patches
 
 PIXELS_APART = 4
@@ -38,12 +39,16 @@ class Training:
         self._taken = 0
         self._count = config.sampler.chains
         self._generator = torch.Generator().manual_seed(seed)
-        self._store = instantiate(config.reuse.store)(layout=samples.layout)
+        self._device = training_device(config)
+        self._store = instantiate(config.reuse.store)(layout=samples.layout, device=self._device)
         self._weights = torch.zeros(0, dtype=torch.float64)  # by id
         self._schedule = instantiate(config.schedule)
         stream: Any = _Answered()
-        self._module = build_module(config, samples=samples, stream=stream, folder=folder)
+        module = build_module(config, samples=samples, stream=stream, folder=folder)
+        self._module = module.to(self._device)
         self._module.trainer = instantiate(config.trainer)(default_root_dir=folder, max_steps=1)
+        if isinstance(self._module.trainer, GraphTrainer):
+            self._module.record()
         self._optimizer = self._module.configure_optimizers()
         self._rates = [group["lr"] for group in self._optimizer.param_groups]
         self._samples = samples
@@ -65,7 +70,7 @@ class Training:
                 current=None,
                 loss_weights=self._weights[ids].float(),
             )
-            self._step(batch)
+            self._step(batch.to(self._device))
 
     def errors(self, patches: Patches, truth: Tensor) -> Tensor:
         """[n] mean absolute differences of log1p radiance between prediction and `truth`.
@@ -76,13 +81,13 @@ class Training:
 
     def answers(self, patches: Patches) -> Tensor:
         """[n, h, w, 3] log1p radiance by the averaged weights, at every fourth row and column."""
-        (buffers, vectors), _ = self._samples.example(patches)
+        (buffers, vectors), _ = self._samples.example(patches.to(self._device))
         averaged = self._module.averaged
         network = self._module.network if averaged is None else averaged.module
         sparse = buffers[:, ::PIXELS_APART, ::PIXELS_APART].contiguous()
         with torch.no_grad(), self._module.trainer.precision_plugin.forward_context():
             answer: Tensor = network(sparse, vectors)
-        return answer.float()
+        return answer.float().cpu()
 
     def _step(self, batch: Batch) -> None:
         factor = self._schedule.factor(steps=self._taken, used=self._taken / self.steps)
