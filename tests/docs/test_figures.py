@@ -1,14 +1,18 @@
 """README, start page and page of results say no more than their tables do."""
 
 import json
+import math
 import re
 from itertools import pairwise
 
+import numpy as np
 import pandas as pd
 import pytest
 
+from analysis.ceiling import differences
 from analysis.readme_table import claim_lines
 from analysis.runs import METRICS
+from analysis.statistics import paired_difference
 from tests.docs.pages import ROOT
 
 PHRASES = {
@@ -184,3 +188,22 @@ def test_the_page_of_results_says_of_the_map_what_the_map_says() -> None:
     low, high = said("docs/results.md", r"For the \*mean\* error it takes (\d) to (\d) times")
     slower = sorted(round(1 / base["error_uniform", reuse]) for reuse in (True, False))
     assert slower == [int(low), int(high)]
+
+
+def test_the_readme_says_of_dear_patches_what_their_runs_say() -> None:
+    folder = ROOT / "docs" / "exploration-ceiling"
+    found = differences(pd.read_csv(folder / "scarce_ceiling.csv"))
+    (row,) = found.query(
+        "scene == 'all of them' and steps == 1600 and choice == 'oracle' and error == 'hard_error'"
+    ).to_dict("records")
+    measured = f"{-100 * row['difference']:.1f}", f"{100 * row['half_width']:.1f}"
+    assert said("README.md", r"few and clean (\d\.\d) % ± (\d\.\d): no") == measured
+
+    last = pd.read_csv(folder / "scarce_chains.csv").groupby(["method", "scene", "seed"]).last()
+    error = np.log(last[[f"hard_{metric}" for metric in METRICS]]).mean(axis=1).map(math.exp)
+    ways = (error[f"ours_{way}"].to_dict() for way in ("uniform", "exploring"))
+    chains = paired_difference(*ways)
+    assert chains is not None
+    assert chains.half_width is not None
+    measured = f"{100 * chains.mean:.1f}", f"{100 * chains.half_width:.1f}", str(chains.n)
+    assert said("README.md", r"has (\d\.\d) % ± (\d\.\d) more \(\[(\d+) pairs") == measured

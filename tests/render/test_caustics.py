@@ -232,5 +232,6 @@ def test_photons_are_traced_again_where_more_than_the_camera_moves(load, monkeyp
     seen, vectors = renderer(), ([0.2, 0.0], [0.2, 1.0], [0.9, 1.0], [0.2, 1.0], [0.2, 1.0])
     pictures = [(direct(seen, v), len(traced)) for v in vectors]
     assert [count for _, count in pictures] == [1, 1, 2, 3, 3]
+    fresh = {tuple(v): direct(renderer(), v) for v in vectors[:3]}  # the others repeat one
     for v, (picture, _) in zip(vectors, pictures, strict=True):
-        np.testing.assert_array_equal(picture, direct(renderer(), v))
+        np.testing.assert_array_equal(picture, fresh[tuple(v)])
