@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import torch
 
-from ngi.config.build import _training_device
+from ngi.config.build import training_device
 from ngi.patches import BufferLayout, Patches
 from ngi.reuse import CompactPatches, PatchStore
 from ngi.reuse.compact import ON_DEVICE
@@ -91,8 +91,8 @@ def test_patches_rendered_on_the_gpu_are_refused_where_they_are_not_finite() -> 
 
 @pytest.mark.usefixtures("gpu")
 def test_a_run_on_the_processor_keeps_them_there() -> None:
-    assert _training_device(run_config("trainer=fp32")) == "cuda"
-    assert _training_device(run_config("trainer=fp32", "trainer.accelerator=cpu")) == "cpu"
+    assert training_device(run_config("trainer=fp32")) == "cuda"
+    assert training_device(run_config("trainer=fp32", "trainer.accelerator=cpu")) == "cpu"
 
 
 @pytest.mark.usefixtures("gpu")

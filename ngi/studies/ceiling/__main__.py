@@ -12,6 +12,7 @@ from ngi.config.configuration import register
 from ngi.config.hydra_program import MESSAGES, fail, run_program, with_overrides
 from ngi.config.values import check_values
 from ngi.files.resources import root
+from ngi.machine.repeatable import make_repeatable
 
 log = logging.getLogger(__name__)
 
@@ -22,6 +23,7 @@ def _main(config: DictConfig) -> None:
 
     try:
         check_values(config)
+        make_repeatable()
         log.info("written: %s", run_all(config))
     except MESSAGES as error:
         fail(error, job=config.run.folder)

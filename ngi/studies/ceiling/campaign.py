@@ -20,7 +20,6 @@ from ngi.files.durable import write_atomically, write_tensors
 from ngi.learn import Samples
 from ngi.machine.memory import keep_freed_memory
 from ngi.machine.provenance import provenance
-from ngi.machine.repeatable import make_repeatable
 from ngi.reuse import CompactPatches
 from ngi.studies.ceiling.pool import check_count, chosen, render_pool
 from ngi.studies.ceiling.runs import CHUNK, Run, do, measured, plan
@@ -49,7 +48,6 @@ def run_all(config: DictConfig) -> Path:
     sampler = instantiate(config.sampler)
     check_count(study.pool, sampler)
     keep_freed_memory()
-    make_repeatable()
     with closing(instantiate(config.renderer)) as renderer:
         claim(folder, config, scene=renderer.scene_hash, backend=renderer.description)
         samples = build_samples(config, renderer=renderer)
