@@ -10,10 +10,8 @@ from tests.gpu.machine import pretended_gpu
 from tests.studies.test_ceiling import configuration
 
 
-def test_a_study_on_the_gpu_comes_to_what_one_on_the_cpu_comes_to(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("ngi.models.batched_muon.multiplies_bfloat16", lambda _: True)
+@pytest.mark.usefixtures("muon_rounds_alike")
+def test_a_study_on_the_gpu_comes_to_what_one_on_the_cpu_comes_to(tmp_path: Path) -> None:
     on_cpu = pd.read_csv(campaign.run_all(configuration(tmp_path / "cpu")))
     with pretended_gpu() as ledger:
         on_gpu = pd.read_csv(campaign.run_all(configuration(tmp_path / "gpu", "trainer=graphs")))

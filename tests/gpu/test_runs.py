@@ -87,12 +87,9 @@ def assert_close(a: Path, b: Path) -> None:
         )
 
 
+@pytest.mark.usefixtures("muon_rounds_alike")
 @pytest.mark.parametrize("name", RUNS)
-def test_a_run_on_the_gpu_is_that_on_the_cpu(
-    tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Muon rounds alike on both, where this processor has no units for bfloat16 either."""
-    monkeypatch.setattr("ngi.models.batched_muon.multiplies_bfloat16", lambda _: True)
+def test_a_run_on_the_gpu_is_that_on_the_cpu(tmp_path: Path, name: str) -> None:
     trained(tmp_path / "cpu", *RUNS[name])
     with pretended_gpu() as ledger:
         result = trained(tmp_path / "gpu", *RUNS[name])
