@@ -1,9 +1,10 @@
-"""Clearances in two of the shipped scenes, and what the mirror shows."""
+"""Clearances in shipped scenes, what the mirror shows, and when the shutters let light in."""
 
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import numpy as np
+import pytest
 import yaml
 from skimage.measure import points_in_poly
 
@@ -90,3 +91,45 @@ def test_figure_stays_behind_the_camera_and_clear_of_the_room() -> None:
     assert (low + points.min(axis=0))[0] > -3.4 + 0.025
     assert (high + points.max(axis=0))[0] < 3.4 - 0.025
     assert points[:, 1].min() == 0
+
+
+def light_let_in(scene_vectors, paths=500):
+    """Share of the rays from the lamp to the inner hole that the outer one lets through, [n].
+
+    scene_vectors: [n, 9]
+    """
+    root, specification = scene_files("shutters")
+    random = np.random.default_rng(0)
+    lamp = shape_translation(root, "lamp")
+    radius = float(root.find(".//shape[@id='lamp']/float").get("value"))
+    ball = random.normal(size=(paths, 3))
+    start = lamp + radius * ball / np.linalg.norm(ball, axis=1, keepdims=True)
+
+    def hole(name, components):
+        """Centres [n, 3] and radius; the shutters are drawn about their holes."""
+        low, high = shape_translation(root, name) + travel(specification, name)
+        v = np.insert(scene_vectors[:, components], 0, 0.0, axis=1)
+        corners, _ = read_ply(SCENES / "shutters" / f"{name}.ply")
+        return low + v * (high - low), np.linalg.norm(corners[:, 1:3], axis=1).min()
+
+    outer, outer_radius = hole("outer_shutter", [0, 1])
+    inner, inner_radius = hole("inner_shutter", [2, 3])
+    angle, distance = 2 * np.pi * random.random(paths), np.sqrt(random.random(paths))
+    disk = distance[:, None] * np.stack([np.zeros(paths), np.cos(angle), np.sin(angle)], axis=1)
+    end = inner[:, None] + inner_radius * disk
+    share = (outer[:, None, :1] - start[..., :1]) / (end[..., :1] - start[..., :1])
+    crossing = start + share * (end - start)
+    return (np.linalg.norm(crossing - outer[:, None], axis=-1) < outer_radius).mean(axis=1)
+
+
+def test_shutters_let_light_in_at_few_of_their_positions() -> None:
+    let_in = light_let_in(np.random.default_rng(1).random((10_000, 9)))
+    # Wherever a ray crosses the outer shutter's plane: the share of its positions that are in line.
+    _, specification = scene_files("shutters")
+    low, high = travel(specification, "outer_shutter")
+    expected = np.pi * 0.05**2 / np.prod((high - low)[1:])
+    assert let_in.mean() == pytest.approx(expected, abs=3 * let_in.std() / 100)
+    assert 0.03 < (let_in > 0.01).mean() < 0.07
+    hard = light_let_in(np.array(specification["hard_frames"]))
+    assert (hard[:7] > 0.9).all()
+    assert ((hard[7:] > 0.1) & (hard[7:] < 0.9)).all()
