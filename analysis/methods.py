@@ -24,6 +24,7 @@ TITLES = {
     "ours_uniform": "ours with uniform sampling",
     "ours": "ours with a Sobol sequence",
     "ours_predicted": "ours with more states of high predicted loss",
+    "ours_eager": "ours after what is rare, by predicted loss",
     "ours_exploring": "ours exploring, with Active Exploration's chains",
     "ours_loss_target": "ours exploring, with the loss alone as target",
     "ours_metropolis": "ours exploring, with Metropolis acceptance",

@@ -15,7 +15,7 @@ EXPLORING = {
     "ours_loss_target": "mcmc_loss",
     "ours_metropolis": "mcmc_metropolis",
 }
-OURS = ("ours", "ours_uniform", "ours_predicted", *EXPLORING)
+OURS = ("ours", "ours_uniform", "ours_predicted", "ours_eager", *EXPLORING)
 LIGHT = ["specular", "direct and caustics"]
 METHODS = {  # sampler, resolution, model, what the renderer traces into the buffers
     "active_exploration": ("mcmc_loss_step", "growing", PRECONDITIONED, []),
@@ -36,6 +36,7 @@ METHODS = {  # sampler, resolution, model, what the renderer traces into the buf
     "ours": ("sobol", "constant", "encoded_generator", LIGHT),
     "ours_uniform": ("uniform", "constant", "encoded_generator", LIGHT),
     "ours_predicted": ("predicted_loss", "constant", "encoded_generator", LIGHT),
+    "ours_eager": ("predicted_loss_eager", "constant", "encoded_generator", LIGHT),
     **{
         method: (sampler, "constant", "encoded_generator", LIGHT)
         for method, sampler in EXPLORING.items()
@@ -79,7 +80,7 @@ def test_a_method_differs_where_its_name_says_and_nowhere_else(method: str) -> N
     found = (chosen.sampler, chosen.resolution, chosen.model, traced)
     assert found == METHODS[method]
     assert config.label.method == method
-    assert config.renderer.halves == (chosen.sampler == "predicted_loss")
+    assert config.renderer.halves == chosen.sampler.startswith("predicted_loss")
     other = composed("budget=small")
     if method == "fixed_data":
         other.reuse = composed("budget=small", "reuse=epochs").reuse
@@ -103,7 +104,7 @@ def test_ours_differs_in_every_part_that_can_be_taken_out_again(method: str) -> 
         "schedule": "warmup_stable_decay",
         "averaging": "exponential",
         "data": "denoised_patches",
-        "reuse": "by_samples",
+        "reuse": "steady_by_loss" if method == "ours_eager" else "by_samples",
     }
 
 

@@ -21,6 +21,7 @@ OF_ONE_SIZE = (
     "needed",
     "ours_hour",
     "ours_predicted",
+    "rare",
     "smoke",
     "stability",
 )
