@@ -54,6 +54,7 @@ SAMPLERS = {
         )
         for rule in ("greedy", "metropolis")
     },
+    "loss_greedy_large_steps": "loss, greedy, 70 % large steps",
     "predicted": "predicted loss",
     "eager": "predicted loss, eager",
 }
@@ -100,7 +101,8 @@ def scoring_cost(sampler: str) -> float:
     """Of one batch, in training steps; nothing for uniform sampling."""
     if sampler in (UNIFORM, OWN):
         return 0.0
-    return SCORING[sampler if sampler in SCORING else sampler.rsplit("_", 1)[0]]
+    target = sampler.removesuffix("_large_steps").rsplit("_", 1)[0]
+    return SCORING[sampler if sampler in SCORING else target]
 
 
 def samplers_of(table: pd.DataFrame) -> dict[str, str]:

@@ -8,6 +8,7 @@ from itertools import product
 from ngi.studies.exploration_map.setting import (
     AT_MOST,
     BY_LOSS,
+    CHAINS,
     EAGER,
     METHODS,
     OURS,
@@ -124,5 +125,6 @@ PLANS = {
     "ours_by_loss": replace(
         OURS_LONG, methods=tuple(method for method in OURS if method.reuse), reuse=BY_LOSS
     ),
+    "ours_chains": replace(OURS_LONG, methods=CHAINS),
     "ours_eager": replace(OURS_LONG, methods=(Method(EAGER, reuse=True),), reuse=BY_LOSS),
 }

@@ -18,6 +18,9 @@ UNIFORM, PREDICTED, EAGER = "uniform", "predicted", "eager"
 PREDICTING = {PREDICTED: "predicted_loss", EAGER: "predicted_loss_eager"}
 """Samplers without chains, and the option of the program's configuration that each is."""
 
+LARGE_STEPS = "_large_steps"
+"""Ends the name of chains that propose as many small steps as the paper's propose large ones."""
+
 SAMPLERS = (UNIFORM, *(f"{target}_{rule}" for target, rule in product(TARGETS, ACCEPTANCES)))
 
 SELF_TUNING = ("reuse=self_tuning", "reuse.policy.bootstrap_batches=20", "reuse.policy.beta=2.0")
@@ -59,8 +62,8 @@ class Setting:
 class Method:
     """A way of choosing samples.
 
-    sampler: one of `SAMPLERS`: "uniform", or a target and an acceptance rule; or of `PREDICTING`;
-        or of `KNOWN`, which takes the place of the uniform one
+    sampler: one of `SAMPLERS`: "uniform", or a target and an acceptance rule, which `LARGE_STEPS`
+        may follow; or of `PREDICTING`; or of `KNOWN`, which takes the place of the uniform one
     reuse: whether stored patches are trained on again, as the plan says
     """
 
@@ -84,11 +87,11 @@ class Method:
             return [f"sampler={UNIFORM}"]
         if self.predicts:
             return [f"sampler={PREDICTING[self.sampler]}"]
-        target, rule = self.sampler.rsplit("_", 1)
-        return [
-            f"sampler={ACCEPTANCES[rule]}",
-            f"sampler.target._target_={TARGETS[target]}",
-        ]
+        target, rule = self.sampler.removesuffix(LARGE_STEPS).rsplit("_", 1)
+        chains = [f"sampler={ACCEPTANCES[rule]}", f"sampler.target._target_={TARGETS[target]}"]
+        if self.sampler.endswith(LARGE_STEPS):
+            chains.append("sampler.proposal.large_step_probability=0.7")
+        return chains
 
 
 KNOWN = {"known": False, "known_weighted": True}
@@ -99,6 +102,11 @@ KNOWN_SHARE = 0.1
 
 OURS = tuple(Method(sampler, reuse) for reuse in (False, True) for sampler in (UNIFORM, PREDICTED))
 """Of the map with our learner."""
+
+CHAINS = tuple(
+    Method("loss_greedy" + steps, reuse) for reuse in (False, True) for steps in ("", LARGE_STEPS)
+)
+"""The best chains of the map, with the paper's steps and with fewer small ones."""
 
 AT_MOST = tuple(Method(sampler, reuse=False) for sampler in (UNIFORM, PREDICTED, *KNOWN))
 """What could be gained, and what is."""

@@ -124,6 +124,21 @@ def test_eager_predictions_differ_in_how_states_are_drawn_from_them() -> None:
     assert draws["uniform_share"] < usual["uniform_share"]
 
 
+def test_chains_with_larger_steps_differ_in_nothing_else() -> None:
+    plan = PLANS["ours_chains"]
+    assert replace(plan, methods=PLANS["ours_long"].methods) == PLANS["ours_long"]
+    for usual, large in zip(plan.methods[::2], plan.methods[1::2], strict=True):
+        made, other = (training.plain_configuration(method, plan) for method in (large, usual))
+        steps, small_steps = (
+            each["sampler"]["proposal"].pop("large_step_probability") for each in (made, other)
+        )
+        assert (steps, small_steps) == (0.7, 0.3)
+        assert made == other
+        assert made["sampler"]["target"]["_target_"] == "ngi.explore.Loss"
+        assert made["sampler"]["acceptance"]["_target_"] == "ngi.explore.Greedy"
+    assert {method.reuse for method in plan.methods} == {False, True}
+
+
 @pytest.mark.parametrize("sampler", ["predicted", "eager"])
 def test_predictions_are_counted_as_scores_are(sampler: str) -> None:
     """One per new batch, also where chains would have nothing to be compared with yet."""
