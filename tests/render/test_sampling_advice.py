@@ -1,4 +1,4 @@
-"""Which sampler a scene is told to use: what moves light, what makes caustics, what is dear."""
+"""Which sampler a scene is told to use: what moves or bars light, makes caustics, is dear."""
 
 import pytest
 
@@ -47,11 +47,11 @@ def advice(tmp_path):
     return give
 
 
-@pytest.mark.parametrize("variables", [[PAINT], [MOVE_BALL], [DIM_BULB], [PAINT, MOVE_BALL]])
-def test_where_no_light_moves_nothing_is_rare(advice, variables) -> None:
+@pytest.mark.parametrize("variables", [[PAINT], [DIM_BULB], [PAINT, DIM_BULB]])
+def test_where_nothing_moves_nothing_is_rare(advice, variables) -> None:
     text = advice(*variables, ball=GLASS)
     assert text.startswith("sampler=sobol: ")
-    assert "predicted_loss" not in text
+    assert "ours_exploring" not in text
     assert "samples_per_pixel" not in text
     assert text.count("docs/guide/sampler.md") == 1
 
@@ -61,8 +61,16 @@ def test_where_no_light_moves_nothing_is_rare(advice, variables) -> None:
 )
 def test_what_a_light_does_that_moves_or_goes_out_can_be_rare(advice, variable, light) -> None:
     text = advice(PAINT, variable)
-    assert "sampler=predicted_loss" in text
+    assert "ours_exploring or ours_eager" in text
     assert f"{light} moves or goes out" in text
+    assert "caustics" not in text
+
+
+def test_what_moves_may_let_light_pass_at_few_of_its_positions(advice) -> None:
+    text = advice(PAINT, MOVE_BALL, ball=GLASS)
+    assert "ours_exploring or ours_eager" in text
+    assert "ball may bar the light's way" in text
+    assert "moves or goes out" not in text
     assert "caustics" not in text
 
 
@@ -87,5 +95,5 @@ def test_where_patches_are_dear_more_of_them_come_first(advice) -> None:
 def test_a_pilot_run_says_how_concentrated_its_loss_is_and_what_follows() -> None:
     text = pilot_advice(0.083)
     assert "had 8% of the loss" in text
-    assert "sampler=predicted_loss pays from 30% on" in text
+    assert "exploring pays from 20% on" in text
     assert (root() / PAGE).is_file()
