@@ -52,7 +52,7 @@ def plate(lower: tuple[float, float], upper: tuple[float, float], hole: float) -
     lower, upper: its corners in y and z
     """
     corners = [np.arctan2(z, y) for y in (lower[0], upper[0]) for z in (lower[1], upper[1])]
-    angles = np.unique(np.concatenate([EVENLY, corners]))
+    angles = np.unique(np.concatenate([EVENLY, corners]).round(9))
     inner = circle(hole, angles)
     with np.errstate(divide="ignore"):
         reach = np.maximum(upper / inner, lower / inner)  # along a ray, in radii of the hole
