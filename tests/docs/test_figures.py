@@ -207,3 +207,24 @@ def test_the_readme_says_of_dear_patches_what_their_runs_say() -> None:
     assert chains.half_width is not None
     measured = f"{100 * chains.mean:.1f}", f"{100 * chains.half_width:.1f}", str(chains.n)
     assert said("README.md", r"has (\d\.\d) % ± (\d\.\d) more \(\[(\d+) pairs") == measured
+
+
+def test_what_is_said_of_the_rare_is_what_its_runs_say() -> None:
+    runs = pd.read_csv(ROOT / "docs/exploration-ceiling/rare.csv")
+    last = runs[runs["step"] == 3000].set_index(["method", "seed"])
+    error = np.log(last[[f"hard_{metric}" for metric in METRICS]]).mean(axis=1).map(math.exp)
+    figures = []
+    for method in ("ours_eager", "ours_exploring"):
+        difference = paired_difference(error["ours"].to_dict(), error[method].to_dict())
+        assert difference is not None
+        assert difference.half_width is not None
+        assert difference.n == 3
+        figures += [f"{-100 * difference.mean:.0f}", f"{100 * difference.half_width:.0f}"]
+    percent = r"(\d+) % ± (\d+)"
+    pattern = rf"ends with {percent} less error on frames that have it.+?chains with {percent} less"
+    for page in ("README.md", "docs/results.md"):
+        assert said(page, pattern) == tuple(figures)
+    lit = (last["lit_patches"] / last["patches_traced"]).groupby("method").mean()
+    page, pattern = "docs/exploration-ceiling/rare.md", r"in (\d+) % of its.+?in (\d+) % of theirs"
+    shares = said(page, pattern)
+    assert shares == (f"{100 * lit['ours']:.0f}", f"{100 * lit['ours_exploring']:.0f}")
