@@ -40,8 +40,8 @@ def sampling_advice(scene: VariableScene, materials: list[Material]) -> list[str
     lines = ["sampler=sobol: where the error is everywhere no choice of patches gains anything"]
     if causes := _rare(scene, materials):
         lines.append(
-            f"method=ours_exploring or ours_eager, where {CONCENTRATED:.0%} and more of a pilot "
-            f"run's loss is on the worst 5% of its patches: {'; '.join(causes)}"
+            f"method=ours_eager, where {CONCENTRATED:.0%} and more of a pilot run's loss is on "
+            f"the worst 5% of its patches: {'; '.join(causes)}"
         )
     spp = scene.description.samples_per_pixel
     if spp >= DEAR:

@@ -31,7 +31,7 @@ WINDOW = (1.82, 0.36)
 
 SHUTTER_HALF_SIZE = 0.95
 HOLES = {"outer_shutter": 0.05, "inner_shutter": 0.055}
-"""Radii. The lamp's cone through them is half of 15 degrees wide, wherever they are in line."""
+"""Radii. Where they are in line, the lamp's light comes through as a cone 30 degrees wide."""
 
 COLUMN = [(0.19, 0.0), (0.19, 0.05), (0.14, 0.08), (0.12, 0.62), (0.16, 0.66), (0.16, 0.7)]
 """(radius, height) from bottom to top."""

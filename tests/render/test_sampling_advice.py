@@ -51,7 +51,7 @@ def advice(tmp_path):
 def test_where_nothing_moves_nothing_is_rare(advice, variables) -> None:
     text = advice(*variables, ball=GLASS)
     assert text.startswith("sampler=sobol: ")
-    assert "ours_exploring" not in text
+    assert "ours_eager" not in text
     assert "samples_per_pixel" not in text
     assert text.count("docs/guide/sampler.md") == 1
 
@@ -61,14 +61,14 @@ def test_where_nothing_moves_nothing_is_rare(advice, variables) -> None:
 )
 def test_what_a_light_does_that_moves_or_goes_out_can_be_rare(advice, variable, light) -> None:
     text = advice(PAINT, variable)
-    assert "ours_exploring or ours_eager" in text
+    assert "method=ours_eager, where 20% and more" in text
     assert f"{light} moves or goes out" in text
     assert "caustics" not in text
 
 
 def test_what_moves_may_let_light_pass_at_few_of_its_positions(advice) -> None:
     text = advice(PAINT, MOVE_BALL, ball=GLASS)
-    assert "ours_exploring or ours_eager" in text
+    assert "method=ours_eager, where 20% and more" in text
     assert "ball may bar the light's way" in text
     assert "moves or goes out" not in text
     assert "caustics" not in text
