@@ -66,7 +66,8 @@ def pilot_advice(worst_share: float) -> str:
 def _rare(scene: VariableScene, materials: list[Material]) -> list[str]:
     """Why an effect may be seen at few v only; nothing where no light and no object moves."""
     variables = scene.description.variables
-    lights, others = [], []
+    lights: list[str] = []
+    others: list[str] = []
     for variable in filter(_moves_or_goes_out, variables):
         found = lights if any(map(emits, scene.owners(variable))) else others
         found.append("+".join(variable.objects))
