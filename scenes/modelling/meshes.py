@@ -93,6 +93,19 @@ def box(minimum: tuple[float, ...], maximum: tuple[float, ...]) -> Mesh:
     return Mesh(vertices, faces)
 
 
+def box_frame(
+    left: float, right: float, bottom: float, top: float, *, back: float, width: float, depth: float
+) -> list[Mesh]:
+    """Four boxes in the shape of a rectangular frame that lies on the plane z = back, facing +z."""
+    front = back + depth
+    return [
+        box((left, bottom, back), (right, bottom + width, front)),
+        box((left, top - width, back), (right, top, front)),
+        box((left, bottom + width, back), (left + width, top - width, front)),
+        box((right - width, bottom + width, back), (right, top - width, front)),
+    ]
+
+
 def turned(profile: list[tuple[float, float]], segments: int) -> Mesh:
     """A prism with the given (radius, height) from bottom to top, closed by flat ends."""
     angle = 2 * np.pi * (np.arange(segments) + 0.5) / segments

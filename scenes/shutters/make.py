@@ -19,7 +19,7 @@ import numpy as np
 
 sys.path.append(str(Path(__file__).parents[1]))
 
-from modelling.meshes import Mesh, box, sweep, turned, write_ply
+from modelling.meshes import Mesh, box, box_frame, sweep, turned, write_ply
 from modelling.ornaments import vase
 from modelling.textures import floor_boards, save_jpeg
 
@@ -78,21 +78,15 @@ def window_frame() -> list[Mesh]:
 
 
 def trim() -> list[Mesh]:
-    """Skirting boards along back and right wall, and three panels on the back wall."""
+    """Skirting boards along three walls, and three panels on the back wall."""
     (x0, _, z0), (x1, _, z1) = ROOM_MINIMUM, ROOM_MAXIMUM
     boards = [
         box((x0, 0, z0), (x1, 0.13, z0 + 0.02)),
         box((x1 - 0.02, 0, z0 + 0.02), (x1, 0.13, z1)),
         box((x0, 0, z0 + 0.02), (x0 + 0.02, 0.13, z1)),
     ]
-    width, front = 0.03, z0 + 0.018
     for left, right in ((-1.42, -0.55), (-0.4, 0.46), (0.61, 1.48)):
-        boards += [
-            box((left, 0.3, z0), (right, 0.3 + width, front)),
-            box((left, 2.2 - width, z0), (right, 2.2, front)),
-            box((left, 0.3 + width, z0), (left + width, 2.2 - width, front)),
-            box((right - width, 0.3 + width, z0), (right, 2.2 - width, front)),
-        ]
+        boards += box_frame(left, right, 0.3, 2.2, back=z0, width=0.03, depth=0.018)
     return boards
 
 

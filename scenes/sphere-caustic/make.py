@@ -19,7 +19,7 @@ from PIL import Image
 
 sys.path.append(str(Path(__file__).parents[1]))
 
-from modelling.meshes import Mesh, box, write_ply
+from modelling.meshes import Mesh, box, box_frame, write_ply
 from modelling.textures import hash_noise, value_noise
 
 ROOM_MINIMUM = np.array([-1.0, 0.0, -1.0])
@@ -74,18 +74,6 @@ def wall_strip(bottom: float, top: float, depth: float) -> list[Mesh]:
     ]
 
 
-def wall_panel(left: float, right: float, bottom: float, top: float) -> list[Mesh]:
-    """A moulding in the shape of a rectangular frame on the back wall."""
-    width, depth = 0.028, 0.016
-    back, front = ROOM_MINIMUM[2], ROOM_MINIMUM[2] + depth
-    return [
-        box((left, bottom, back), (right, bottom + width, front)),
-        box((left, top - width, back), (right, top, front)),
-        box((left, bottom + width, back), (left + width, top - width, front)),
-        box((right - width, bottom + width, back), (right, top - width, front)),
-    ]
-
-
 def make(folder: Path) -> None:
     """Writes every asset into `folder`."""
     supersampled = Image.fromarray(parquet(1536, 3072))
@@ -93,7 +81,7 @@ def make(folder: Path) -> None:
 
     trim = wall_strip(0.0, 0.11, 0.02) + wall_strip(1.95, 2.0, 0.035)
     for left, right in ((-0.9, -0.52), (-0.44, 0.44), (0.52, 0.9)):
-        trim += wall_panel(left, right, 0.24, 1.82)
+        trim += box_frame(left, right, 0.24, 1.82, back=ROOM_MINIMUM[2], width=0.028, depth=0.016)
     write_ply(folder / "trim.ply", trim)
 
 
