@@ -61,7 +61,7 @@ SAMPLERS = {
 """Every sampler that explores, and its name."""
 
 SCORING = {
-    "loss": 0.35,
+    **dict.fromkeys(("loss", "loss_greedy_large_steps"), 0.35),
     "output_gradient": 0.4,
     "loss_step": 1.4,
     **dict.fromkeys(("predicted", "eager"), 0.17),  # the same forest, drawn from otherwise
@@ -101,8 +101,7 @@ def scoring_cost(sampler: str) -> float:
     """Of one batch, in training steps; nothing for uniform sampling."""
     if sampler in (UNIFORM, OWN):
         return 0.0
-    target = sampler.removesuffix("_large_steps").rsplit("_", 1)[0]
-    return SCORING[sampler if sampler in SCORING else target]
+    return SCORING[sampler if sampler in SCORING else sampler.rsplit("_", 1)[0]]
 
 
 def samplers_of(table: pd.DataFrame) -> dict[str, str]:

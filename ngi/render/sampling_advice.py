@@ -18,7 +18,7 @@ PAGE = "docs/guide/sampler.md"
 CONCENTRATED = 0.2
 """Share of the loss on the worst 5 % of a pilot run's patches from which on a choice pays.
 
-The paper's scenes have 0.08 to 0.12, `shutters`, where light gets in at 5 % of all v, 0.21 to 0.27.
+The paper's scenes have 0.08 to 0.12, `shutters`, where light gets in at 5 % of all v, 0.19 to 0.26.
 """
 
 SHINY = 0.1

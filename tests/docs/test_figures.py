@@ -39,6 +39,12 @@ def said(page: str, pattern: str) -> tuple[str, ...]:
     return found.groups()
 
 
+def hard_error(evaluations: pd.DataFrame) -> pd.Series:
+    """Geometric mean of the metrics on hard frames."""
+    metrics = [f"hard_{metric}" for metric in METRICS]
+    return np.log(evaluations[metrics]).mean(axis=1).map(math.exp)
+
+
 def test_the_readme_gives_every_claim_the_verdict_of_the_report() -> None:
     lines = claim_lines((ROOT / "docs/small/results.md").read_text())
     verdicts = {line["claim"]: line["of the claim"] for line in lines if line["of the claim"]}
@@ -200,7 +206,7 @@ def test_the_readme_says_of_dear_patches_what_their_runs_say() -> None:
     assert said("README.md", r"few and clean (\d\.\d) % ± (\d\.\d): no") == measured
 
     last = pd.read_csv(folder / "scarce_chains.csv").groupby(["method", "scene", "seed"]).last()
-    error = np.log(last[[f"hard_{metric}" for metric in METRICS]]).mean(axis=1).map(math.exp)
+    error = hard_error(last)
     ways = (error[f"ours_{way}"].to_dict() for way in ("uniform", "exploring"))
     chains = paired_difference(*ways)
     assert chains is not None
@@ -212,7 +218,7 @@ def test_the_readme_says_of_dear_patches_what_their_runs_say() -> None:
 def test_what_is_said_of_the_rare_is_what_its_runs_say() -> None:
     runs = pd.read_csv(ROOT / "docs/exploration-ceiling/rare.csv")
     last = runs[runs["step"] == 3000].set_index(["method", "seed"])
-    error = np.log(last[[f"hard_{metric}" for metric in METRICS]]).mean(axis=1).map(math.exp)
+    error = hard_error(last)
     figures = []
     for method in ("ours_eager", "ours_exploring"):
         difference = paired_difference(error["ours"].to_dict(), error[method].to_dict())
