@@ -13,7 +13,12 @@ from tests.learn.small_stream import steps
 
 @pytest.mark.parametrize(
     ("reuse", "samples_per_pixel", "reused"),
-    [("by_samples", 32, 0.92), ("by_samples", 512, 0.98), ("steady", 512, 0.92)],
+    [
+        ("by_samples", 32, 0.92),
+        ("by_samples", 512, 0.98),
+        ("by_loss", 512, 0.98),
+        ("steady", 512, 0.92),
+    ],
 )
 def test_a_reuse_policy_is_told_how_clean_patches_are_where_it_asks(
     reuse: str, samples_per_pixel: int, reused: float, tmp_path: Path

@@ -104,7 +104,7 @@ def test_ours_differs_in_every_part_that_can_be_taken_out_again(method: str) -> 
         "schedule": "warmup_stable_decay",
         "averaging": "exponential",
         "data": "denoised_patches",
-        "reuse": "steady_by_loss" if method == "ours_eager" else "by_samples",
+        "reuse": "by_loss" if method == "ours_eager" else "by_samples",
     }
 
 

@@ -8,12 +8,13 @@ from itertools import product
 from ngi.studies.exploration_map.setting import (
     AT_MOST,
     BY_LOSS,
+    BY_SAMPLES,
     CHAINS,
     EAGER,
     METHODS,
     OURS,
     SELF_TUNING,
-    STEADY,
+    UNIFORM,
     Method,
     Setting,
 )
@@ -91,8 +92,13 @@ OURS_LONG = Plan(
     frames=400,
     methods=OURS,
     learner=(*OUR_LEARNER, *NOISE_KNOWN),
-    reuse=STEADY,
+    reuse=BY_SAMPLES,
 )
+
+LONGER = replace(
+    OURS_LONG, settings=(_in_dimensions(32, BASE.volume), replace(BASE, volume=0.001)), steps=16000
+)
+"""Where the mean pays for eager predictions after 4,000 steps."""
 
 PLANS = {
     "smoke": Plan(
@@ -127,4 +133,6 @@ PLANS = {
     ),
     "ours_chains": replace(OURS_LONG, methods=CHAINS),
     "ours_eager": replace(OURS_LONG, methods=(Method(EAGER, reuse=True),), reuse=BY_LOSS),
+    "ours_longer": replace(LONGER, methods=(Method(UNIFORM, reuse=True),)),
+    "ours_eager_longer": replace(LONGER, methods=(Method(EAGER, reuse=True),), reuse=BY_LOSS),
 }

@@ -25,9 +25,9 @@ SAMPLERS = (UNIFORM, *(f"{target}_{rule}" for target, rule in product(TARGETS, A
 
 SELF_TUNING = ("reuse=self_tuning", "reuse.policy.bootstrap_batches=20", "reuse.policy.beta=2.0")
 """As in all small budgets: with the paper's 100 and 4.6 hardly a batch would be new."""
-STEADY = ("reuse=steady",)
-"""That of `method=ours` at 32 samples per pixel, whoever chooses the samples."""
-BY_LOSS = ("reuse=steady_by_loss",)
+BY_SAMPLES = ("reuse=by_samples",)
+"""That of `method=ours`, whoever chooses the samples."""
+BY_LOSS = ("reuse=by_loss",)
 """The same, stored patches drawn with replacement, a tenth in proportion to their losses."""
 NO_REUSE = ("reuse=never",)
 

@@ -93,7 +93,7 @@ def test_the_long_plan_reuses_as_ours_does_and_knows_the_noise() -> None:
     plan = PLANS["ours_long"]
     for method in plan.methods:
         made = training.plain_configuration(method, plan)
-        policy = "FixedProbability" if method.reuse else "Never"
+        policy = "FixedProbability.by_samples" if method.reuse else "Never"
         assert made["reuse"]["policy"]["_target_"].endswith(policy)
         assert made["renderer"]["halves"] is True
     (last,) = rows(Method("predicted", reuse=True), plan=replace(plan, steps=12, evaluations=1))
@@ -235,3 +235,17 @@ def test_a_tenth_of_the_frames_is_in_the_pockets() -> None:
     TestSet(renderer, frames=40).errors(lambda buffers, v: seen.append(v) or buffers[..., :3])
     lit = renderer.weights(seen[0]).sum(dim=1) > 0
     assert lit.tolist() == [False] * 36 + [True] * 4
+
+
+def test_longer_plans_differ_in_their_length_and_are_of_what_four_thousand_steps_do_not_teach() -> (
+    None
+):
+    uniform, eager = PLANS["ours_longer"], PLANS["ours_eager_longer"]
+    assert uniform.steps == eager.steps == 4 * PLANS["ours_long"].steps
+    assert set(uniform.settings) == set(eager.settings) < set(PLANS["ours_long"].settings)
+    assert {(setting.dimensions, setting.volume) for setting in uniform.settings} == {
+        (32, 0.01),
+        (8, 0.001),
+    }
+    assert replace(eager, steps=4000, settings=PLANS["ours_eager"].settings) == PLANS["ours_eager"]
+    assert uniform.reuse == PLANS["ours_long"].reuse
