@@ -39,9 +39,9 @@ def said(page: str, pattern: str) -> tuple[str, ...]:
     return found.groups()
 
 
-def hard_error(evaluations: pd.DataFrame) -> pd.Series:
-    """Geometric mean of the metrics on hard frames."""
-    metrics = [f"hard_{metric}" for metric in METRICS]
+def geometric_mean(evaluations: pd.DataFrame, frames: str) -> pd.Series:
+    """Of the metrics on "hard" or "uniform" frames."""
+    metrics = [f"{frames}_{metric}" for metric in METRICS]
     return np.log(evaluations[metrics]).mean(axis=1).map(math.exp)
 
 
@@ -206,7 +206,7 @@ def test_the_readme_says_of_dear_patches_what_their_runs_say() -> None:
     assert said("README.md", r"few and clean (\d\.\d) % ± (\d\.\d): no") == measured
 
     last = pd.read_csv(folder / "scarce_chains.csv").groupby(["method", "scene", "seed"]).last()
-    error = hard_error(last)
+    error = geometric_mean(last, "hard")
     ways = (error[f"ours_{way}"].to_dict() for way in ("uniform", "exploring"))
     chains = paired_difference(*ways)
     assert chains is not None
@@ -218,7 +218,7 @@ def test_the_readme_says_of_dear_patches_what_their_runs_say() -> None:
 def test_what_is_said_of_the_rare_is_what_its_runs_say() -> None:
     runs = pd.read_csv(ROOT / "docs/exploration-ceiling/rare.csv")
     last = runs[runs["step"] == 3000].set_index(["method", "seed"])
-    error = hard_error(last)
+    error = geometric_mean(last, "hard")
     figures = []
     for method in ("ours_eager", "ours_exploring"):
         difference = paired_difference(error["ours"].to_dict(), error[method].to_dict())
@@ -234,3 +234,26 @@ def test_what_is_said_of_the_rare_is_what_its_runs_say() -> None:
     page, pattern = "docs/exploration-ceiling/rare.md", r"in (\d+) % of its.+?in (\d+) % of theirs"
     shares = said(page, pattern)
     assert shares == (f"{100 * lit['ours']:.0f}", f"{100 * lit['ours_exploring']:.0f}")
+
+
+def test_the_table_of_the_rare_with_clean_patches_is_of_its_runs() -> None:
+    runs = pd.read_csv(ROOT / "docs/exploration-ceiling/rare_256.csv").set_index(["method", "seed"])
+    section = (
+        (ROOT / "docs/exploration-ceiling/rare.md").read_text().split("the price goes away")[1]
+    )
+    lines = [line.replace("*", "") for line in section.splitlines() if line.startswith("| ")]
+    shown = [[cell.strip() for cell in line.split("|")[2:-1]] for line in lines]
+    for method, rows in (("ours_eager", shown[2:4]), ("ours_exploring", shown[4:6])):
+        for frames, row in zip(("hard", "uniform"), rows, strict=True):
+            error = geometric_mean(runs, frames)
+            base = error["ours", 0].to_numpy()
+            seeds = error[method].groupby("seed")
+            changes = [100 * own.to_numpy() / base - 100 for _, own in seeds]
+            cells = [", ".join(map(percent, each)) for each in zip(*changes, strict=True)]
+            assert row == cells
+
+
+def percent(number: float) -> str:
+    """Without decimals, as pages have it."""
+    rounded = round(number)
+    return "0" if rounded == 0 else f"{rounded:+d}".replace("-", "−")
