@@ -30,7 +30,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         "ours_long: in 4,000 steps, of losses without noise; "
         "ours_by_loss: the same, stored patches drawn by loss; "
         "ours_eager: and predicted losses without a bound to speak of; "
-        "…_longer: in 16,000 steps, where 4,000 are too few; "
+        "ours_longer, ours_eager_longer: uniform sampling and those in 16,000 steps, where 4,000 "
+        "are too few; "
         "ours_chains: as ours_long, greedy chains with the paper's steps and with larger ones; "
         "known_…: and a sampler that knows where the rare is, over so many steps",
     )
