@@ -237,9 +237,7 @@ def test_a_tenth_of_the_frames_is_in_the_pockets() -> None:
     assert lit.tolist() == [False] * 36 + [True] * 4
 
 
-def test_longer_plans_differ_in_their_length_and_are_of_what_four_thousand_steps_do_not_teach() -> (
-    None
-):
+def test_longer_plans_are_of_what_four_thousand_steps_do_not_teach() -> None:
     uniform, eager = PLANS["ours_longer"], PLANS["ours_eager_longer"]
     assert uniform.steps == eager.steps == 4 * PLANS["ours_long"].steps
     assert set(uniform.settings) == set(eager.settings) < set(PLANS["ours_long"].settings)
