@@ -14,6 +14,9 @@ from analysis.command import errors_in_a_line
 from analysis.statistics import Estimate, paired_difference
 from analysis.tables import MISSING, Cell, Table, format_percent, to_markdown
 
+RUN = ["scene", "patches", "steps", "choice", "seed"]
+"""Columns that tell the runs of a study apart."""
+
 BASELINE = "uniform"
 
 ERRORS = {
@@ -36,12 +39,20 @@ EVERYWHERE = "all of them"
 def read_runs(folder: Path) -> pd.DataFrame:
     """A row per finished run of `python -m ngi.studies.ceiling` below `folder`.
 
-    Raises ValueError where there is none.
+    Raises ValueError where there is none, and where a run is there twice: runs of two studies, of
+    other samples per pixel for one, do not say so in their rows.
     """
     files = sorted(folder.rglob("runs/*.csv"))
     if not files:
         raise ValueError(f"{folder}: no runs of `python -m ngi.studies.ceiling` in it")
-    return pd.concat([pd.read_csv(file) for file in files], ignore_index=True)
+    runs = pd.concat(
+        [pd.read_csv(file).assign(file=str(file)) for file in files], ignore_index=True
+    )
+    again = runs[runs.duplicated(RUN, keep=False)]
+    if not again.empty:
+        first, second = again.sort_values(RUN)["file"].iloc[:2]
+        raise ValueError(f"{first} and {second} are the same run; give the folder of one study")
+    return runs.drop(columns="file")
 
 
 def differences(runs: pd.DataFrame) -> pd.DataFrame:

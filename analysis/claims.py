@@ -55,7 +55,7 @@ class Claim:
 
     @property
     def command(self) -> str:
-        return f"python -m ngi.train -m +sweeps={self.id} budget=small"
+        return f"make report SWEEPS={self.id}"
 
 
 _OF_THE_PAPER = (

@@ -57,6 +57,7 @@ class Sweep(Callback):
             _show_and_exit(lambda: _planned(config))
         self._begun = time.time()
         self._notes = Path(config.hydra.sweep.dir, f".sweep-{os.getpid()}").resolve()
+        shutil.rmtree(self._notes, ignore_errors=True)  # a killed process had the same number
         self._notes.mkdir(parents=True)
         atexit.register(self._end)
         with suppress(*NOT_COMPOSED):  # Hydra will say what is wrong

@@ -36,8 +36,8 @@ class Planned:
     state: 'finished', 'new', 'interrupted', 'longer' (finished with a smaller budget), 'again'
         (`run.on_code_change=restart`), or else why it cannot start
     done: part of its budget that is used up, 0 to 1
-    left: seconds of training that are left, at most; None where nobody knows, and 0 where a run
-        trains nothing
+    left: seconds of training that are left, about: what comes after the last checkpoint is done
+        again; None where nobody knows, and 0 where a run trains nothing
     choices: words that not all runs of the sweep have in common; the folder's name may be cut
     """
 
@@ -144,6 +144,8 @@ def _left(
 
 def _seconds_per_step(config: DictConfig) -> float | None:
     """Of a step with all that a step can have; None where that was never measured."""
+    if config.budget.costs is None:
+        return None
     file = CostFile(Path(config.budget.costs))
     if not file.path.exists():
         return None
@@ -171,7 +173,7 @@ def table(runs: Sequence[Planned]) -> str:
     known = [run.left for run in to_do if run.left is not None]
     summary = f"{counted(runs)}: {', '.join(total)}"
     if known:
-        summary += f"; at most {duration(sum(known))} of training left"
+        summary += f"; about {duration(sum(known))} of training left"
     if len(known) < len(to_do):
         what = "they take" if not known else f"{len(to_do) - len(known)} of them take"
         summary += f"; how long {what} is not known, `ngi costs` with the same words measures it"

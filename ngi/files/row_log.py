@@ -37,9 +37,9 @@ class RowLog(GrowingFile[TextIO]):
 
     @property
     def last_row(self) -> dict[str, str] | None:
-        """The last one that is on the disk, as text; None where there is none."""
-        lines = self.path.read_text().splitlines() if self.path.exists() else []
-        return next(csv.DictReader([lines[0], lines[-1]])) if len(lines) > 1 else None
+        """The last whole one that is on the disk, as text; None where there is none."""
+        whole = self._whole_lines()
+        return next(csv.DictReader([whole[0][1], whole[-1][1]])) if len(whole) > 1 else None
 
     @property
     def last_step(self) -> int:
@@ -55,20 +55,34 @@ class RowLog(GrowingFile[TextIO]):
         self.close()
         if not self.path.exists():
             return 0
-        with self.path.open(newline="") as stream:
-            lines = stream.readlines()
+        lines = self._lines()
         if not lines:
             return 0
-        position = next(csv.reader(lines[:1])).index("step")
-        kept = lines[:1]
-        for line in lines[1:]:
-            fields = next(csv.reader([line.replace("\0", "")]), [])
-            # A line cut short by a crash has no newline or step, and its numbers can't be trusted.
-            whole = line.endswith("\n") and len(fields) > position and fields[position].isdigit()
-            if whole and int(fields[position]) <= step:
-                kept.append(line)
+        kept = [line for its_step, line in self._whole_lines() if its_step <= step]
         write_atomically(self.path, "".join(kept).encode())
         return len(lines) - len(kept)
+
+    def _lines(self) -> list[str]:
+        if not self.path.exists():
+            return []
+        with self.path.open(newline="") as stream:
+            return stream.readlines()
+
+    def _whole_lines(self) -> list[tuple[int, str]]:
+        """Each with its step, the header's 0.
+
+        A line cut short by a crash has no newline or step, and its numbers can't be trusted.
+        """
+        lines = self._lines()
+        if not lines:
+            return []
+        position = next(csv.reader(lines[:1])).index("step")
+        whole = [(0, lines[0])]
+        for line in lines[1:]:
+            fields = next(csv.reader([line.replace("\0", "")]), [])
+            if line.endswith("\n") and len(fields) > position and fields[position].isdigit():
+                whole.append((int(fields[position]), line))
+        return whole
 
     def _open(self, columns: list[str]) -> None:
         continued = self.path.exists() and self.path.stat().st_size > 0

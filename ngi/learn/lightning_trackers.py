@@ -73,7 +73,7 @@ class TensorBoard(LightningLogger):
             name="tensorboard",
             version="",
             default_hp_metric=False,
-            purge_step=last + 1 if last else None,
+            purge_step=last + 1,
         )
 
     def _picture(self, name: str, image: Image.Image, step: int) -> None:

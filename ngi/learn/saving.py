@@ -32,6 +32,10 @@ class BudgetAndCheckpoint(Callback):
     """
 
     def __init__(self, run: Run, *, every_seconds: float, every_steps: int | None) -> None:
+        if every_steps is not None and every_steps < 1:
+            raise ValueError(
+                f"run.checkpoint_steps: {every_steps}: give at least 1, or null for seconds alone"
+            )
         self._run = run
         self._every_seconds = every_seconds
         self._every_steps = every_steps

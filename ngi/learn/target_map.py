@@ -8,7 +8,8 @@ from torch import Tensor
 from torch.quasirandom import SobolEngine
 from tqdm import tqdm
 
-from ngi.explore import Signals, Target
+from ngi.explore import Proposals, Signals, Target
+from ngi.learn.ahead import ProposalsAhead
 from ngi.learn.samples import Samples
 from ngi.patches import Patches
 from ngi.reuse import CompactPatches
@@ -84,17 +85,10 @@ class TargetMap:
         }
 
     def _render(self, states: Tensor, *, seed: int) -> CompactPatches:
-        job = self._samples.start_patches(states, resolution=self._resolution, seed=seed)
-        rendered = job.result()
-        patches = Patches(
-            scene_vector=states[:, :-2],
-            position=states[:, -2:],
-            resolution=torch.full((len(states),), self._resolution),
-            large_step=torch.ones(len(states), dtype=torch.bool),
-            buffers=rendered.buffers,
-            log_radiance=rendered.log_radiance,
-        )
-        return CompactPatches.compress(patches, self._samples.layout)
+        proposals = Proposals(states, large_step=torch.ones(len(states), dtype=torch.bool))
+        ahead = ProposalsAhead(proposals, resolution=self._resolution, seed=seed)
+        ahead.start(self._samples)
+        return CompactPatches.compress(ahead.patches(), self._samples.layout)
 
     def _grid(self, parts: list[Tensor]) -> np.ndarray:
         return torch.cat(parts).float().numpy(force=True).reshape(self._states.shape[:-1])

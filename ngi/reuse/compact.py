@@ -149,11 +149,6 @@ class PatchBlocks:
             **{name: torch.stack([b[name][row] for b, row in rows]) for name in self._blocks[0]}
         )
 
-    @property
-    def nbytes(self) -> int:
-        """Bytes of memory behind all blocks, as allocated."""
-        return sum(t.untyped_storage().nbytes() for block in self._blocks for t in block.values())
-
 
 def _keep(tensor: Tensor, dtype: torch.dtype, device: torch.device | str = "cpu") -> Tensor:
     return uploaded(tensor.detach().to(dtype), device)

@@ -73,18 +73,18 @@ class PatchStore:
         return self._rule.by_loss
 
     @property
-    def nbytes(self) -> int:
-        """Bytes allocated for patches, ids and losses (the Python dictionary of ids is not in)."""
-        return self._blocks.nbytes + self._ids.nbytes + self._losses.nbytes
-
-    @property
     def bytes_per_patch(self) -> float:
-        """Bytes that one patch more takes, as measured; NaN for an empty store."""
+        """Bytes that one patch more takes, as measured; NaN for an empty store.
+
+        The Python dictionary of ids is not in.
+        """
         if not self._slots:
             return float("nan")
         one = self._blocks.read([0]).tensors().values()
-        bookkeeping = self._ids.element_size() + self._losses.element_size()
-        return sum(tensor.untyped_storage().nbytes() for tensor in one) + bookkeeping
+        bookkeeping = (self._ids, self._losses, self._weights)
+        return sum(tensor.untyped_storage().nbytes() for tensor in one) + sum(
+            tensor.element_size() for tensor in bookkeeping
+        )
 
     @property
     def mean_age(self) -> float:

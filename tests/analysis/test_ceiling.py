@@ -57,6 +57,16 @@ def test_differences_are_paired_by_seed(tmp_path: Path) -> None:
     assert everything["difference"] == pytest.approx((-0.5 - 0.6) / 2)
 
 
+def test_runs_of_two_studies_are_not_mixed(tmp_path: Path) -> None:
+    """A row does not say with how many samples per pixel it was made, say."""
+    for name in ("a", "b"):
+        write(tmp_path / name, "room,64,400,uniform,0,0.10,0.2,0.3,0.2")
+    named = f"{tmp_path}/a/room/runs/0.csv and {tmp_path}/b/room/runs/0.csv are the same run"
+    with pytest.raises(ValueError, match=named):
+        read_runs(tmp_path)
+    assert len(read_runs(tmp_path / "a")) == 1
+
+
 def test_all_scenes_together_have_a_pair_per_scene_and_seed(tmp_path: Path) -> None:
     study(tmp_path)
     found = differences(read_runs(tmp_path))

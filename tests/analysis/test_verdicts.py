@@ -1,3 +1,4 @@
+import re
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ from analysis.runs import find_runs
 from analysis.verdicts import ALL_SCENES, ClaimResult, Verdict, judge
 
 REPOSITORY = Path(__file__).resolve().parents[2]
+MAKEFILE = (REPOSITORY / "Makefile").read_text()
 
 
 def judged(folder: Path) -> dict[str, ClaimResult]:
@@ -25,7 +27,9 @@ def test_a_claim_needs_what_its_sweep_runs(claim) -> None:
     methods = {m for comparison in claim.comparisons for m in (comparison.better, comparison.worse)}
     assert scenes == set(parameters["scene"].split(","))
     assert methods <= set(parameters["method"].split(","))
-    assert claim.command == f"python -m ngi.train -m +sweeps={claim.id} budget=small"
+    assert claim.command == f"make report SWEEPS={claim.id}"
+    by_default = re.search(r"^SWEEPS := (.*?[^\\])\n", MAKEFILE, flags=re.DOTALL | re.MULTILINE)
+    assert claim.id in by_default[1].split()
 
 
 def test_every_claim_has_a_test_that_decides() -> None:

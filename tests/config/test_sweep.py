@@ -1,13 +1,17 @@
 """What a sweep says before, between and after its runs, as its user sees it."""
 
+import atexit
 import json
+import os
 import re
 import shutil
 from pathlib import Path
 
 import pytest
+from omegaconf import OmegaConf
 
-from ngi.config.sweep import progress
+from ngi.config import sweep as program
+from ngi.config.sweep import Sweep, progress
 from ngi.config.sweep_plan import Planned, duration, table
 from tests.learn.command_line import SIZE, SMALL, run, run_module
 
@@ -72,6 +76,21 @@ def test_in_the_end_it_says_what_failed_and_why(finished: tuple[Path, str]) -> N
     assert not [*folder.rglob(".sweep-*")]
 
 
+def test_notes_that_a_killed_sweep_left_are_not_of_the_next_with_its_process_number(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    left = tmp_path / f".sweep-{os.getpid()}"
+    left.mkdir()
+    (left / "0.json").write_text("{}")
+    planned = []
+    monkeypatch.setattr(program, "_planned", lambda config: planned.append(config) or [])
+    monkeypatch.setattr(atexit, "register", planned.append)
+    config = OmegaConf.create({"hydra": {"sweep": {"dir": str(tmp_path)}}})
+    Sweep(dry_run=False).on_multirun_start(config)
+    assert len(planned) == 2
+    assert [*left.iterdir()] == []
+
+
 def contents(folder: Path) -> dict[Path, bytes]:
     return {file: file.read_bytes() for file in folder.rglob("*") if file.is_file()}
 
@@ -117,7 +136,7 @@ def test_seconds_are_known_and_one_run_alone_has_a_dry_run_too(tmp_path: Path) -
     status, output = run(tmp_path, *words, options=("--dry-run",), base=SIZE)
     assert status == 0, output
     assert "new      0%      1:30" in output
-    assert "1 run: 1 new; at most 1:30 of training left" in output
+    assert "1 run: 1 new; about 1:30 of training left" in output
     assert not (tmp_path / "outputs").exists()
 
 
@@ -139,7 +158,14 @@ def test_steps_take_what_they_were_measured_to_cost(tmp_path: Path) -> None:
         tmp_path, *words, f"budget.costs={file.path}", options=("--dry-run",), base=SIZE
     )
     assert status == 0, output
-    assert "1 run: 1 new; at most 6:40 of training left" in output
+    assert "1 run: 1 new; about 6:40 of training left" in output
+
+
+def test_without_a_file_of_costs_nobody_knows_how_long_steps_take(tmp_path: Path) -> None:
+    words = ("budget=steps", "budget.steps=9", "budget.costs=null", PLACE)
+    status, output = run(tmp_path, *words, options=("--dry-run",), base=SIZE)
+    assert status == 0, output
+    assert "1 run: 1 new; how long they take is not known" in output
 
 
 BROKEN = """
@@ -213,7 +239,7 @@ def test_the_table_adds_up() -> None:
     runs = [planned("new", 3000), planned("interrupted", 700), planned("again", None)]
     shown = table([*runs, planned("finished", 0), planned("cannot start: no", None)])
     assert "5 runs: 1 new, 1 interrupted, 1 again, 1 finished, 1 cannot start;" in shown
-    assert "at most 1:01:40 of training left; how long 1 of them take is not known" in shown
+    assert "about 1:01:40 of training left; how long 1 of them take is not known" in shown
 
 
 @pytest.mark.parametrize(

@@ -42,6 +42,7 @@ def test_a_line_cut_short_by_a_crash_is_dropped(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     write(path, range(1, 4)).close()
     path.write_text(path.read_text() + "4,0.")
+    assert RowLog(path).last_step == 3
     RowLog(path).keep_until(10)
     assert pd.read_csv(path)["step"].tolist() == [1, 2, 3]
 

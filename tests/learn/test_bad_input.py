@@ -41,6 +41,7 @@ def test_an_error_of_the_command_line_ends_it(
         (["resolution.start=8"], ["resolution", "8", "16", "patch"]),
         (["sampler.chains=0"], ["chains", "0"]),
         (["evaluation.count=0"], ["evaluation.count"]),
+        (["run.checkpoint_steps=0"], ["run.checkpoint_steps: 0", "null"]),
         (["model.hidden_layers=0"], ["hidden_layers"]),
         (["tracker=wandb", "tracker.mode=maybe"], ["tracker.mode", "maybe"]),
         (["run.lpips_weights=/nowhere.pth"], ["nowhere.pth"]),

@@ -19,7 +19,7 @@ pytestmark = [
 ]
 
 
-def interrupted(folder: Path, *overrides: str) -> Path:
+def interrupted(folder: Path, *overrides: str, stopped: int = STOPPED) -> Path:
     """The folder of a run that was broken off and went on."""
 
     def run() -> DictConfig:
@@ -27,15 +27,16 @@ def interrupted(folder: Path, *overrides: str) -> Path:
         config.budget.steps = STEPS
         return config
 
-    stop(run(), STOPPED)
+    stop(run(), stopped)
     train(run())
     return folder / "run"
 
 
-@pytest.fixture(scope="module")
-def tensorboard(tmp_path_factory: pytest.TempPathFactory) -> Path:
+@pytest.fixture(scope="module", params=[STOPPED, 3], ids=["stopped", "before a checkpoint"])
+def tensorboard(tmp_path_factory: pytest.TempPathFactory, request) -> Path:
     pytest.importorskip("tensorboard", reason="the extra tensorboard is missing")
-    return interrupted(tmp_path_factory.mktemp("tensorboard"), "tracker=tensorboard")
+    folder = tmp_path_factory.mktemp("tensorboard")
+    return interrupted(folder, "tracker=tensorboard", stopped=request.param)
 
 
 def test_tensorboard_has_every_step_once_and_every_evaluation(tensorboard: Path) -> None:

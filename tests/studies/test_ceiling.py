@@ -13,12 +13,14 @@ from ngi.explore import Importance
 from ngi.studies.ceiling import campaign, runs
 from ngi.studies.ceiling.runs import Run, plan, true_errors
 
+PROTOCOL = "evaluation.evaluator.protocol"
+
 SMALL = (
     *("renderer=pockets", "data=patches", "renderer.patch_size=16", "renderer.dimensions=2"),
     *("~renderer.direct", "~renderer.specular", "budget=smoke", "trainer=fp32"),
     "model.hidden_features=16",
     "model.directions=false",
-    *("resolution.start=32", "sampler.chains=4", "evaluation.evaluator.protocol.resolution=32"),
+    *("resolution.start=32", "sampler.chains=4", f"{PROTOCOL}.resolution=32"),
     *("ceiling.pool=64", "ceiling.sizes=[{patches: 16, steps: 8}]", "ceiling.rounds=2"),
     *("ceiling.teacher_steps=4", "ceiling.seeds=1"),
 )
@@ -51,6 +53,12 @@ def test_every_run_of_a_small_study_is_done_once_and_repeats(tmp_path: Path) -> 
         campaign.run_all(configuration(tmp_path / "a", "ceiling.rounds=4"))
     with pytest.raises(ValueError, match="made with another configuration"):
         campaign.run_all(configuration(tmp_path / "a", "model.hidden_layers=4"))
+    with pytest.raises(ValueError, match="made with another protocol"):
+        campaign.run_all(configuration(tmp_path / "a", f"{PROTOCOL}.resolution=48"))
+    with pytest.raises(ValueError, match="made with another choice oracle_weighted"):
+        campaign.run_all(
+            configuration(tmp_path / "a", "ceiling.choices.oracle_weighted.uniform_share=0.5")
+        )
 
 
 def test_who_renders_a_scene_and_where_it_lies_makes_no_other_study(tmp_path: Path) -> None:
@@ -71,6 +79,7 @@ def test_who_renders_a_scene_and_where_it_lies_makes_no_other_study(tmp_path: Pa
     [
         ("ceiling.sizes=[{patches: 64, steps: 8}]", "leave no choice"),
         ("ceiling.pool=40", "multiple of 32"),
+        ("reuse=by_loss", "reuse: .* reuse=by_samples"),
     ],
 )
 def test_what_makes_no_study_is_refused_before_anything_is_rendered(

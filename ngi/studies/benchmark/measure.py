@@ -99,15 +99,6 @@ def counted_kernels() -> Iterator[KernelCounts]:
     counts.recorded = sum(kernel["recording_mode"] == recorded for kernel in kernels)
 
 
-@contextmanager
-def counted_compilations() -> Iterator[list[int]]:
-    """Gives a list that holds, after the block, the number of kernels compiled inside it."""
-    count = [0]
-    with counted_kernels() as kernels:
-        yield count
-    count[0] = kernels.compiled
-
-
 STEPS = (
     "parameters",
     "acceleration structure",

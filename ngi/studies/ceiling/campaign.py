@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 from contextlib import closing
 from pathlib import Path
@@ -45,24 +44,10 @@ def run_all(config: DictConfig) -> Path:
             seeds=study.seeds,
         )
     )
-    sampler = instantiate(config.sampler)
-    check_count(study.pool, sampler)
     keep_freed_memory()
-    with closing(instantiate(config.renderer)) as renderer:
-        claim(folder, config, scene=renderer.scene_hash, backend=renderer.description)
-        samples = build_samples(config, renderer=renderer)
-        evaluator = instantiate(config.evaluation.evaluator)(
-            renderer=renderer, test_inputs=samples.test_inputs
-        )
-        evaluator.prepare()
-        pool = render_pool(
-            folder / "pool",
-            samples=samples,
-            sampler=sampler,
-            resolution=instantiate(config.resolution).resolution(0),
-            count=study.pool,
-        )
+    samples, evaluator, pool = _rendered(config, folder)
     truth = _truth(config, samples, pool, evaluator, folder)
+    _file(folder, runs[0]).parent.mkdir(exist_ok=True)
     for run in tqdm(runs, desc="runs", unit="run"):
         if not _file(folder, run).exists():
             training = Training(
@@ -77,10 +62,40 @@ def run_all(config: DictConfig) -> Path:
                 rounds=study.rounds,
                 evaluator=evaluator,
             )
-            _write(_file(folder, run), pd.DataFrame([{"scene": config.scene.name, **row}]))
+            table = pd.DataFrame([{"scene": config.scene.name, **row}])
+            write_atomically(_file(folder, run), table.to_csv(index=False).encode())
     table = pd.concat([pd.read_csv(_file(folder, run)) for run in runs], ignore_index=True)
-    _write(folder / TABLE, table)
+    write_atomically(folder / TABLE, table.to_csv(index=False).encode())
     return folder / TABLE
+
+
+def _rendered(config: DictConfig, folder: Path) -> tuple[Samples, Evaluator, CompactPatches]:
+    """Samples, an evaluator that has its references, and the pool, all that takes a renderer.
+
+    Raises ValueError as `claim` and `check_count` do, and for a store that draws by losses.
+    """
+    sampler, count = instantiate(config.sampler), config.ceiling.pool
+    check_count(count, sampler)
+    with closing(instantiate(config.renderer)) as renderer:
+        if instantiate(config.reuse.store)(layout=renderer.layout).draws_by_loss:
+            raise ValueError(
+                "reuse: its store draws patches by their losses, which this study does not record; "
+                "give reuse=by_samples"
+            )
+        claim(folder, config, scene=renderer.scene_hash, backend=renderer.description)
+        samples = build_samples(config, renderer=renderer)
+        evaluator = instantiate(config.evaluation.evaluator)(
+            renderer=renderer, test_inputs=samples.test_inputs
+        )
+        evaluator.prepare()
+        pool = render_pool(
+            folder / "pool",
+            samples=samples,
+            sampler=sampler,
+            resolution=instantiate(config.resolution).resolution(0),
+            count=count,
+        )
+    return samples, evaluator, pool
 
 
 def _truth(
@@ -116,13 +131,6 @@ def _file(folder: Path, run: Run) -> Path:
     return folder / "runs" / f"{run.name}.csv"
 
 
-def _write(file: Path, table: pd.DataFrame) -> None:
-    stream = io.StringIO()
-    table.to_csv(stream, index=False)
-    file.parent.mkdir(parents=True, exist_ok=True)
-    write_atomically(file, stream.getvalue().encode())
-
-
 PARTS = (
     *("data", "sampler", "reuse", "resolution", "model", "loss", "optimizer", "schedule"),
     *("averaging", "trainer", "renderer"),
@@ -140,7 +148,7 @@ def claim(folder: Path, config: DictConfig, *, scene: str, backend: str) -> None
     """Writes the folder's provenance, or compares it with what its runs were made with.
 
     scene: hash of all its files
-    Raises ValueError where they differ.
+    Raises ValueError where they differ. A choice may be added.
     """
     study = plain(config.ceiling)
     configuration = {part: plain(config[part]) for part in PARTS}
@@ -150,17 +158,16 @@ def claim(folder: Path, config: DictConfig, *, scene: str, backend: str) -> None
         "scene": scene,
         "study": {key: study[key] for key in IN_EVERY_RUN},
         "configuration": configuration,
+        "protocol": plain(config.evaluation.evaluator.protocol),
+        **{f"choice {name}": choice for name, choice in study["choices"].items()},
     }
     file = folder / PROVENANCE
-    if not file.exists():
-        folder.mkdir(parents=True, exist_ok=True)
-        content = {**provenance(backend=backend), **made_with}
-        write_atomically(file, json.dumps(content, indent=1).encode())
-        return
-    found = json.loads(file.read_text())
+    found = json.loads(file.read_text()) if file.exists() else provenance(backend=backend)
     for key, value in made_with.items():
-        if found[key] != json.loads(json.dumps(value)):
+        if found.setdefault(key, value) != json.loads(json.dumps(value)):
             raise ValueError(
                 f"{file}: the runs in this folder were made with another {key} than now; give "
                 "another run.folder, or move the folder away"
             )
+    folder.mkdir(parents=True, exist_ok=True)
+    write_atomically(file, json.dumps(found, indent=1).encode())

@@ -29,8 +29,8 @@ def render_pool(
 ) -> CompactPatches:
     """The first `count` patches that `sampler` proposes, from `folder` or rendered into it.
 
-    Files that are there are not rendered again: an interrupted pool goes on where it stopped, and
-    may be made larger. The seed of a batch's rendering is its number.
+    Files that are there are not rendered again: an interrupted pool goes on where it stopped. The
+    seed of a batch's rendering is its number.
 
     Raises ValueError as `check_count` does.
     """

@@ -17,7 +17,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         description="When does exploration pay? Trains every sampler, target and acceptance rule, "
         "with and without reuse, on closed-form scenes with a knob for each cause, and writes "
         "exploration_map.csv. Goes on where it was interrupted. "
-        "`python -m analysis.exploration_map FOLDER` draws the map.",
+        "`python -m analysis.exploration_map FOLDER` draws the map of --settings full; "
+        "`python -m analysis.exploration_map.final_errors` has the errors of the others.",
     )
     parser.add_argument(
         "--output", metavar="FOLDER", type=Path, default=Path("outputs/exploration-map")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import multiprocessing
 from collections.abc import Iterable, Sequence
@@ -53,7 +52,7 @@ def run_all(plan: Plan, *, seeds: Sequence[int], folder: Path, jobs: int) -> Pat
     ]
     _do([run for run in runs if not run.file(folder).exists()], plan, folder, jobs, len(runs))
     table = pd.concat([pd.read_csv(run.file(folder)) for run in runs], ignore_index=True)
-    _write_csv(folder / TABLE, table)
+    write_atomically(folder / TABLE, table.to_csv(index=False).encode())
     return folder / TABLE
 
 
@@ -87,13 +86,11 @@ def _prepare_process() -> None:
 def _run_to_file(run: Run, *, plan: Plan, folder: Path) -> None:
     file = run.file(folder)
     file.parent.mkdir(parents=True, exist_ok=True)
-    _write_csv(file, pd.DataFrame(train(*run, plan)))
-
-
-def _write_csv(file: Path, table: pd.DataFrame) -> None:
-    stream = io.StringIO()
-    table.to_csv(stream, index=False)
-    write_atomically(file, stream.getvalue().encode())
+    try:
+        table = pd.DataFrame(train(*run, plan, folder=file.parent))
+    except FloatingPointError as error:
+        raise ValueError(f"{file.relative_to(folder)} cannot be made: {error}") from error
+    write_atomically(file, table.to_csv(index=False).encode())
 
 
 def _claim(folder: Path, plan: Plan) -> None:

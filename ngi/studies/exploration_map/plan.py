@@ -75,14 +75,13 @@ NOISE_KNOWN = ("renderer.halves=true", "renderer.samples_per_pixel=2")
 """Each patch is the mean of two samples: predictions are made of losses without its noise."""
 
 
+FOR_LONG_RUNS = (replace(BASE, volume=0.001), _in_dimensions(32, BASE.volume))
+"""Where the mean pays for eager predictions after 4,000 steps."""
+
+
 def _ours() -> tuple[Setting, ...]:
     """Where exploration pays by the full map: volume, dimensions and noise, each alone."""
-    return (
-        BASE,
-        replace(BASE, volume=0.001),
-        _in_dimensions(32, BASE.volume),
-        replace(BASE, noise=1.0),
-    )
+    return (BASE, *FOR_LONG_RUNS, replace(BASE, noise=1.0))
 
 
 OURS_LONG = Plan(
@@ -95,10 +94,7 @@ OURS_LONG = Plan(
     reuse=BY_SAMPLES,
 )
 
-LONGER = replace(
-    OURS_LONG, settings=(_in_dimensions(32, BASE.volume), replace(BASE, volume=0.001)), steps=16000
-)
-"""Where the mean pays for eager predictions after 4,000 steps."""
+LONGER = replace(OURS_LONG, settings=FOR_LONG_RUNS, steps=16000)
 
 PLANS = {
     "smoke": Plan(

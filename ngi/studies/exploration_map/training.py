@@ -61,9 +61,12 @@ def _scene(setting: Setting, plan: Plan) -> tuple[PocketRenderer, TestSet]:
     return renderer, TestSet(renderer, frames=plan.frames)
 
 
-def train(setting: Setting, method: Method, seed: int, plan: Plan) -> Iterator[dict[str, Any]]:
+def train(
+    setting: Setting, method: Method, seed: int, plan: Plan, *, folder: Path
+) -> Iterator[dict[str, Any]]:
     """Trains and gives a row per evaluation: setting, method, seed, what was done, the errors.
 
+    folder: for the step guard's report, if there is one
     generated_batches, scored_batches: batches rendered, and those whose proposals and current
         states were scored, or whose states were drawn by their predicted losses
     lit: mean over the samples trained on of how far the scene's effects are switched on; for
@@ -82,7 +85,7 @@ def train(setting: Setting, method: Method, seed: int, plan: Plan) -> Iterator[d
         stream.sampler.proposal = KnownPockets(
             renderer=renderer, share=KNOWN_SHARE, weighted=KNOWN[method.sampler]
         )
-    module = build_module(config, samples=samples, stream=stream, folder=Path())
+    module = build_module(config, samples=samples, stream=stream, folder=folder)
     optimizer = module.configure_optimizers()
     network = module.network if module.averaged is None else module.averaged.module
     schedule = instantiate(config.schedule)

@@ -41,7 +41,7 @@ def trained(monkeypatch: pytest.MonkeyPatch) -> list[campaign.Run]:
     """The runs that were done, each of which leaves two made-up rows."""
     done: list[campaign.Run] = []
 
-    def made_up(setting, method, seed, plan):  # noqa: ARG001
+    def made_up(setting, method, seed, plan, *, folder):  # noqa: ARG001
         done.append(campaign.Run(setting, method, seed))
         if len(done) == 10:
             raise RuntimeError("the tenth run fails")
@@ -66,6 +66,23 @@ def test_an_interrupted_map_goes_on(tmp_path: Path, trained: list[campaign.Run])
     done = len(trained)
     campaign.run_all(PLAN, seeds=[3, 4], folder=tmp_path, jobs=1)
     assert len(trained) == done
+
+
+def test_a_run_that_leads_nowhere_is_named_and_keeps_its_report_beside_it(
+    tmp_path: Path, trained: list[campaign.Run], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    places = []
+
+    def diverging(setting, method, seed, plan, *, folder):  # noqa: ARG001
+        places.append(folder)
+        raise FloatingPointError("step 9 is the 10th in a row")
+        yield
+
+    monkeypatch.setattr(campaign, "train", diverging)
+    with pytest.raises(ValueError, match=r"uniform-seed=3\.csv cannot be made: step 9"):
+        campaign.run_all(PLAN, seeds=[3], folder=tmp_path, jobs=1)
+    assert places == [campaign.Run(BASE, METHODS[0], 3).file(tmp_path).parent]
+    assert trained == []
 
 
 def test_all_settings_come_before_the_second_seed(

@@ -1,5 +1,7 @@
 """The sampler that knows where the rare is."""
 
+from pathlib import Path
+
 import pytest
 import torch
 
@@ -47,7 +49,7 @@ def test_runs_have_more_of_the_rare_and_count_it_less() -> None:
     plan = Plan(settings=(), steps=40, evaluations=1, frames=20, learner=OUR_LEARNER)
     setting = Setting(dimensions=2, active=2, hidden_features=8)
     uniform, known, weighted = (
-        list(train(setting, Method(sampler, reuse=False), 0, plan))[-1]
+        list(train(setting, Method(sampler, reuse=False), 0, plan, folder=Path()))[-1]
         for sampler in ("uniform", "known", "known_weighted")
     )
     assert known["lit"] > 3 * uniform["lit"]

@@ -1,5 +1,6 @@
 import math
 from dataclasses import fields, replace
+from pathlib import Path
 
 import pytest
 import torch
@@ -17,7 +18,7 @@ SETTING = Setting(volume=0.1, dimensions=2, active=2, hidden_features=8)
 
 
 def rows(method: Method, *, seed: int = 0, plan: Plan = SMALL, setting: Setting = SETTING):
-    return list(train(setting, method, seed, plan))
+    return list(train(setting, method, seed, plan, folder=Path()))
 
 
 def test_uniform_samples_are_lit_as_often_as_the_volume_says() -> None:
