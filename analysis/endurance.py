@@ -40,6 +40,8 @@ def endurance(folder: Path) -> pd.DataFrame:
     Raises ValueError for a run that is too short to tell.
     """
     history = pd.read_csv(folder / "metrics.csv")
+    if lacking := {"step", "wall_seconds", "cpu_seconds"} - set(history):
+        raise ValueError(f"{folder / 'metrics.csv'} has no column {sorted(lacking)[0]}")
     if len(history) < 12:
         raise ValueError(
             f"{folder / 'metrics.csv'}: {len(history)} evaluations are too few to see a trend; "

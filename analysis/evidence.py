@@ -63,7 +63,7 @@ class ComparisonResult:
 
     scene: a scene's name or `ALL_SCENES`; better, worse: options of the group `method`; decisive:
     the effect that the verdict is read from, the geometric mean of the metrics on hard frames;
-    effects: by key as in `METRIC_KEYS` ('hard_mape', 'uniform_lpips', …) and with the suffix
+    effects: by set and metric ('hard_mape', 'uniform_lpips', …) and with the suffix
     '_worst5'; seeds_needed: per method, to decide with a power of 80 %, None where it is decided
     or unknown, `MORE_THAN_MOST_SEEDS` where more than 100; time_ratio: None where the curves do
     not give it; decides: whether the claim's verdict depends on it.

@@ -9,16 +9,11 @@ import numpy as np
 
 from analysis.chain_trace import ChainTrace, read_chain_trace
 from analysis.effective_sample_size import effective_sample_size
-from analysis.exploration_plots import write_exploration_figures
 from analysis.methods import methods_in_order, title
 from analysis.runs import Run
 from analysis.statistics import estimate
 from analysis.step_log import read_steps
 from analysis.tables import MISSING, Cell, Table, format_estimate
-from analysis.target_map import histogram_distances
-
-__all__ = ["exploration_numbers", "exploration_table", "histogram_distances"]
-__all__ += ["write_exploration_figures"]
 
 COLUMNS = {
     "acceptance": "accepted",

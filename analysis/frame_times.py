@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from statistics import median
 
 from analysis.methods import methods_in_order, title
+from analysis.run_checks import FRAME_PARTS
 from analysis.runs import Run
 from analysis.tables import Cell, Table
-
-_PARTS = ("buffers", "paths", "denoiser", "path tracing", "network")
-"""Of a frame, as `ngi.methods.path_tracing.run` names them; the last two are whole frames."""
 
 
 def frame_table(runs: Sequence[Run]) -> Table:
@@ -26,9 +24,9 @@ def frame_table(runs: Sequence[Run]) -> Table:
             frames = [run.result["frame"] for run in timed if run.method == method]
             values = [
                 [frame["samples_per_pixel"] for frame in frames],
-                *([frame["milliseconds"][part] for frame in frames] for part in _PARTS),
+                *([frame["milliseconds"][part] for frame in frames] for part in FRAME_PARTS),
             ]
             cells = (Cell(f"{median(numbers):,.4g}") for numbers in values)
             rows.append((Cell(scene), Cell(title(method)), *cells))
-    parts = (f"{part}, ms" for part in _PARTS)
+    parts = (f"{part}, ms" for part in FRAME_PARTS)
     return Table("Time per frame", ("scene", "method", "spp", *parts), tuple(rows), 2)

@@ -11,6 +11,8 @@ _SPECIAL = {
     "~": r"\textasciitilde{}",
     "^": r"\textasciicircum{}",
     "±": r"$\pm$",
+    "≥": r"$\ge$",
+    "≤": r"$\le$",
     "–": "--",
     "ε": r"$\varepsilon$",
     **{sign: f"\\{sign}" for sign in "&%$#_{}"},

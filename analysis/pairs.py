@@ -21,10 +21,6 @@ class Pair:
     better: Run
     worse: Run
 
-    @property
-    def seed(self) -> int:
-        return self.better.seed
-
 
 def pair_runs(runs: Sequence[Run], scene: str, better: str, worse: str) -> list[Pair]:
     """The runs of a scene with these options of the group `method`, paired by seed, in order.

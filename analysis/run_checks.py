@@ -12,6 +12,9 @@ import pandas as pd
 SETS = ("hard", "uniform")
 METRICS = ("mape", "dssim", "mae", "lpips")
 
+FRAME_PARTS = ("buffers", "paths", "denoiser", "path tracing", "network")
+"""Of a timed frame, as `ngi.methods.path_tracing.run` names them; the last two are whole frames."""
+
 DISTINCTIONS = ("reuse", "resolution", "model", "loss", "budget", "overrides", "experiment")
 """Label fields that tell methods of one sampler apart, the most telling first."""
 
@@ -61,9 +64,13 @@ def _numbers(result: dict[str, Any]) -> Iterator[tuple[str, Any]]:
         if result.get(key) is not None:
             yield key, result[key]
     yield from _entries("seconds", result["seconds"])
-    frame = result.get("frame", {})
-    yield from _entries("frame.milliseconds", frame.get("milliseconds", {}))
-    yield from _entries("frame_seconds", result.get("frame_seconds", {}))
+    if "frame" in result:
+        yield "frame.samples_per_pixel", result["frame"]["samples_per_pixel"]
+        for part in FRAME_PARTS:
+            yield f"frame.milliseconds.{part}", result["frame"]["milliseconds"][part]
+    if "frame_seconds" in result:
+        for part in ("inputs", "network"):
+            yield f"frame_seconds.{part}", result["frame_seconds"][part]
     for set_name in SETS:
         for metric in METRICS:
             if (summary := result["metrics"][set_name][metric]) is not None:

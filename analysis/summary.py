@@ -18,7 +18,6 @@ COSTS = ("steps", "patches_traced", "paths_traced", "run_seconds")
 FRAME_COST = "frame_ms"
 """Milliseconds of a test frame: what has to be rendered for the network beside the buffers, as the
 observations of CNSR, and the network; runs of earlier versions do not know it."""
-METRIC_KEYS = tuple(f"{name}_{metric}" for name in SETS for metric in METRICS)
 
 
 @dataclass(frozen=True)

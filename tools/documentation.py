@@ -60,9 +60,10 @@ def commands() -> str:
     table = "\n".join(["| command | what for |", "| --- | --- |", *rows])
     return (
         f'# Commands\n\n```text title="ngi --help"\n{overview()}\n```\n\n'
-        "`ngi VERB --help` says what a verb takes. All take `key=value`; `train` and `costs` also "
-        "Hydra's `group=option` ([Groups and options](options.md)). The first key can be left out: "
-        "`ngi describe mirror` is `ngi describe scene=mirror`. Only `report` takes `--flags`.\n\n"
+        "`ngi VERB --help` says what a verb takes. All but `report` and `gpu-check`, which take "
+        "`--flags`, take `key=value`; `train` and `costs` also Hydra's `group=option` "
+        "([Groups and options](options.md)), and `train` also `--dry-run`. The first key can be "
+        "left out: `ngi describe mirror` is `ngi describe scene=mirror`.\n\n"
         f"{table}\n\n"
         "Further programs, for studies of the method itself, are started as modules: "
         "`python -m ngi.studies.noise`, `python -m ngi.studies.exploration_map`, "

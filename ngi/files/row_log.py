@@ -69,14 +69,15 @@ class RowLog(GrowingFile[TextIO]):
             return stream.readlines()
 
     def _whole_lines(self) -> list[tuple[int, str]]:
-        """Each with its step, the header's 0.
+        """Each with its step, the header's 0; none where the header is not whole.
 
         A line cut short by a crash has no newline or step, and its numbers can't be trusted.
         """
         lines = self._lines()
-        if not lines:
+        header = next(csv.reader(lines[:1]), [])
+        if "step" not in header or not lines[0].endswith("\n"):
             return []
-        position = next(csv.reader(lines[:1])).index("step")
+        position = header.index("step")
         whole = [(0, lines[0])]
         for line in lines[1:]:
             fields = next(csv.reader([line.replace("\0", "")]), [])

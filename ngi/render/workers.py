@@ -124,6 +124,7 @@ class WorkerRenderer(Renderer):
     def close(self) -> None:
         """A `with` block does it too."""
         self._close()
+        self._local.close()
 
     def __enter__(self) -> Self:
         return self

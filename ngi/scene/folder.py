@@ -99,12 +99,12 @@ def scenes() -> dict[str, dict[str, Any]]:
 
 def _variants(path: Path) -> list[int]:
     """Read only where the word is there: every command asks this of every scene."""
-    if b"variants" not in path.read_bytes():
-        return []
     try:
+        if b"variants" not in path.read_bytes():
+            return []
         top = YamlKeys(path, "", load_yaml(path))
         return top.integers("variants") if "variants" in top else []
-    except ValueError:
+    except (OSError, ValueError):
         return []
 
 

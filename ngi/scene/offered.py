@@ -1,7 +1,7 @@
 """The parameters of a loaded scene that Mitsuba 3.9 can change, and which of them vary here.
 
 Every parameter that `mi.traverse` offers of a plugin is named, with the properties of scene.yaml
-that vary it or with the reason why none does. docs/scenes.md shows it as a table.
+that vary it or with the reason why none does.
 """
 
 from collections.abc import Mapping

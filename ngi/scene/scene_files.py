@@ -176,7 +176,7 @@ def integrator_max_depth(scene: SceneFile) -> int:
     if integrator is None:
         raise ValueError(f"{scene.path}: no <integrator>; add one, <integrator type='path'>")
     hidden = integrator.find("boolean[@name='hide_emitters']")
-    if hidden is not None and hidden.get("value") == "true":
+    if hidden is not None and hidden.get("value", "").lower() == "true":
         raise ValueError(f"{scene.path}: hide_emitters is true, set it to false: emitters show")
     depth = integrator.find("integer[@name='max_depth']")
     if depth is None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
 from dataclasses import dataclass
 
 import numpy as np
+import yaml
 
 from ngi.machine.backend import mi
 from ngi.scene.scene_files import SceneFile, integrator_max_depth
@@ -44,7 +46,7 @@ def candidates(scene: mi.Scene) -> tuple[list[Candidate], int]:
             nameless += 1
             continue
         for name, rest in entries.items():
-            entry = f"{{object: {node.id()}, property: {name}{rest}}}"
+            entry = f"{{object: {_word(node.id())}, property: {name}{rest}}}"
             found.append(Candidate(node.id(), name, entry))
     return found, nameless
 
@@ -64,8 +66,8 @@ def starter_yaml(document: SceneFile, scene: mi.Scene, found: list[Candidate]) -
     lines = [
         "# What varies. Adjust the ranges, take the # away from what should vary, delete the rest.",
         f"# Check it: ngi describe {shlex.quote(str(document.path.parent))}",
-        f"name: {folder_name}",
-        f"scene: {document.path.name}",
+        f"name: {_word(folder_name)}",
+        f"scene: {_word(document.path.name)}",
         f"samples_per_pixel: {count if count > 1 else 64}  # of training patches",
         f"max_depth: {integrator_max_depth(document)}",
         "# Everything that the camera can see, over the whole range of the variables.",
@@ -76,6 +78,12 @@ def starter_yaml(document: SceneFile, scene: mi.Scene, found: list[Candidate]) -
         "# evenly over the hypercube.",
     ]
     return "\n".join(lines) + "\n"
+
+
+def _word(text: str) -> str:
+    """Text as YAML reads it again, in braces too: in quotes where it would be something else."""
+    plain = re.fullmatch(r"[A-Za-z][\w./-]*", text) and yaml.safe_load(text) == text
+    return text if plain else json.dumps(text)
 
 
 def _entries(node: mi.Object, scene: mi.Scene) -> dict[str, str]:

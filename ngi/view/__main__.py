@@ -37,6 +37,8 @@ def view(options: ViewOptions) -> None:
     from ngi.view.subject import subject
     from ngi.view.trained_run import TrainedRun
 
+    if options.resolution < 1:
+        raise ValueError(f"resolution: {options.resolution}: give at least 1")
     try:
         run = TrainedRun.open(Path(options.run), scene_path=options.scene)
     except (ValueError, OSError, RuntimeError) as error:

@@ -11,7 +11,7 @@ from ngi.scene.clearance import camera_problems, meeting_views, out_of_bounds
 from ngi.scene.description import SceneDescription
 from ngi.scene.folder import read_scene, scenes
 from ngi.scene.loading import load
-from ngi.scene.scene_files import named_files, read_scene_file
+from ngi.scene.scene_files import read_scene_file
 from ngi.scene.starter import candidates, starter_yaml
 from ngi.scene.variable_scene import VariableScene
 
@@ -56,7 +56,6 @@ def describe_scene(description: SceneDescription) -> tuple[str, list[str]]:
 def describe_file(path: Path) -> str:
     """What could vary in a plain Mitsuba file; writes a scene.yaml beside it, if there is none."""
     document = read_scene_file(path)
-    named_files(document)
     scene = load(document)
     found, nameless = candidates(scene)
     properties: dict[str, list[str]] = {}

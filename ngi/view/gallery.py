@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -46,11 +47,14 @@ def write_sheets(options: GalleryOptions) -> None:
     names = options.scenes or sorted(known)
     if unknown := set(names) - set(known):
         raise ValueError(f"no scene {sorted(unknown)}; there are {sorted(known)}")
+    if options.configurations < 1:
+        raise ValueError(f"configurations: {options.configurations}: give at least 1")
     folder = Path(options.folder)
     folder.mkdir(parents=True, exist_ok=True)
     for name in tqdm(names, desc="scenes"):
-        renderer = MitsubaRenderer(scene=read_scene(**known[name]), backend=options.backend)
-        sheet(renderer, options).save(folder / f"{name}.jpg", quality=85)
+        scene = read_scene(**known[name])
+        with closing(MitsubaRenderer(scene=scene, backend=options.backend)) as renderer:
+            sheet(renderer, options).save(folder / f"{name}.jpg", quality=85)
         tqdm.write(f"{folder / name}.jpg")
 
 

@@ -22,8 +22,9 @@ class PackOptions:
 
     python -m ngi.view.pack run=outputs/demo/sphere-caustic/method=ours/seed=0 out=networks/sphere
 
-    It can be opened as the run's own folder can: by view, render, video and export. Weights are the
-    averaged ones where the run has such. It cannot be trained on.
+    It can be opened by view, render, video and export, where the scene is known by its name or
+    given by scene=FOLDER. Weights are the averaged ones where the run has such. It cannot be
+    trained on.
     """
 
     run: str = option("a finished run's folder")

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from ngi.denoise import Denoiser, OpenImageDenoise, OptixDenoise
 from ngi.methods.path_tracing import PathTracing
-from ngi.view.run_settings import OpenedRun, opened, read_settings
+from ngi.view.run_settings import OpenedRun, opened, read_settings, settings_of
 from ngi.view.trained_run import TrainedRun
 
 DENOISERS = {f"ngi.denoise.{kind.__name__}": kind for kind in (OpenImageDenoise, OptixDenoise)}
@@ -36,20 +36,20 @@ class PathTracedRun(OpenedRun):
         Raises FileNotFoundError where it is not finished, ValueError for a scene or denoiser that
         is unknown, and RuntimeError where the denoiser does not work here.
         """
-        settings = read_settings(folder)
-        if not (result := folder / "result.json").exists():
-            raise FileNotFoundError(f"{result}: no such file; the run is not finished yet")
-        denoiser = _denoiser(settings["path_tracing"]["denoiser"])
-        run = opened(folder, settings, scene_path)
-        return cls(
-            **run,
-            path_tracing=PathTracing(
-                renderer=run["renderer"],
-                denoiser=denoiser,
-                samples_per_pixel=json.loads(result.read_text())["frame"]["samples_per_pixel"],
-                seed=settings["seed"],
-            ),
-        )
+        with settings_of(folder) as settings:
+            if not (result := folder / "result.json").exists():
+                raise FileNotFoundError(f"{result}: no such file; the run is not finished yet")
+            denoiser = _denoiser(settings["path_tracing"]["denoiser"])
+            run = opened(folder, settings, scene_path)
+            return cls(
+                **run,
+                path_tracing=PathTracing(
+                    renderer=run["renderer"],
+                    denoiser=denoiser,
+                    samples_per_pixel=json.loads(result.read_text())["frame"]["samples_per_pixel"],
+                    seed=settings["seed"],
+                ),
+            )
 
     def radiance(self, scene_vector: Tensor, *, resolution: int) -> Tensor:
         """[H, W, 3] linear radiance of the next frame; its noise is new in every frame."""

@@ -55,6 +55,11 @@ def write_picture(options: PictureOptions) -> None:
         raise ValueError("resolution has to be at least 1, reference at least 0")
     run = TrainedRun.open(Path(options.run), scene_path=options.scene)
     with closing(run.renderer):
+        if options.reference and options.resolution < run.protocol.ssim_window:
+            raise ValueError(
+                f"resolution: {options.resolution}: DSSIM, which a reference is compared by, takes "
+                f"at least {run.protocol.ssim_window}"
+            )
         v = _scene_vector(options, run.renderer)
         begin = perf_counter()
         radiance = run.radiance(v, resolution=options.resolution)

@@ -1,7 +1,8 @@
 """What a run's folder says of its parts, made again; nothing but what comes with this program."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -73,6 +74,19 @@ def read_settings(folder: Path) -> dict[str, Any]:
     except ValueError as error:
         raise ValueError(f"{path} is damaged ({error})") from error
     return settings
+
+
+@contextmanager
+def settings_of(folder: Path) -> Iterator[dict[str, Any]]:
+    """What `read_settings` gives, to open the run by; ValueError where that lacks something."""
+    settings = read_settings(folder)
+    try:
+        yield settings
+    except (KeyError, TypeError) as error:
+        raise ValueError(
+            f"{folder}: settings.json or result.json is damaged, or of another version of the "
+            f"program ({error!r})"
+        ) from error
 
 
 def made_by(settings: dict[str, Any], group: str) -> Callable[..., Any]:

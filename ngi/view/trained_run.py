@@ -13,7 +13,7 @@ from torch import Tensor, nn
 from ngi.files.durable import DamagedError
 from ngi.learn import Samples, network_of, read_checkpoint
 from ngi.machine.captured import Captured, Function
-from ngi.view.run_settings import OpenedRun, made_by, make_samples, opened, plain, read_settings
+from ngi.view.run_settings import OpenedRun, made_by, make_samples, opened, plain, settings_of
 
 RECORDS = "ngi.learn.graph_trainer.GraphTrainer"
 """The trainer that has a run's steps recorded."""
@@ -51,28 +51,28 @@ class TrainedRun(OpenedRun):
         ValueError for a damaged one, for a scene that is unknown or has changed since, and for a
         run without a network.
         """
-        settings = read_settings(folder)
-        if "path_tracing" in settings:
-            raise ValueError(
-                f"{folder} has no network: path tracing took its place; "
-                "`ngi video` shows its frames"
+        with settings_of(folder) as settings:
+            if "path_tracing" in settings:
+                raise ValueError(
+                    f"{folder} has no network: path tracing took its place; "
+                    "`ngi video` shows its frames"
+                )
+            checkpoint = newest_checkpoint(folder)
+            run = opened(folder, settings, scene_path)
+            samples = make_samples(settings, run["renderer"])
+            make = partial(made_by(settings, "model"), **plain(settings["model"]))
+            network = network_of(samples, make)
+            network.load_state_dict(trained_weights(checkpoint["state_dict"]))
+            device = "cuda" if torch.cuda.is_available() else "cpu"
+            network = network.to(device).eval()
+            return cls(
+                **run,
+                step=checkpoint["global_step"],
+                precision=settings["trainer"]["precision"],
+                samples=samples,
+                network=network,
+                image=_image(network, recorded=settings["trainer"]["_target_"] == RECORDS),
             )
-        checkpoint = newest_checkpoint(folder)
-        run = opened(folder, settings, scene_path)
-        samples = make_samples(settings, run["renderer"])
-        make = partial(made_by(settings, "model"), **plain(settings["model"]))
-        network = network_of(samples, make)
-        network.load_state_dict(trained_weights(checkpoint["state_dict"]))
-        device = "cuda" if torch.cuda.is_available() else "cpu"
-        network = network.to(device).eval()
-        return cls(
-            **run,
-            step=checkpoint["global_step"],
-            precision=settings["trainer"]["precision"],
-            samples=samples,
-            network=network,
-            image=_image(network, recorded=settings["trainer"]["_target_"] == RECORDS),
-        )
 
     def predict(self, buffers: Tensor, scene_vector: Tensor) -> Tensor:
         """Buffers [H, W, C] and v [D] in [0, 1] to log1p of linear RGB [H, W, 3], on the CPU."""

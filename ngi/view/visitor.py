@@ -144,6 +144,9 @@ class Visitor:
         return (len(recent) - 1) / (recent[-1] - recent[0])
 
     def _metrics(self, shown: Shown) -> str:
+        smallest = self._subject.protocol.ssim_window
+        if min(shown.view.prediction.shape[:2]) < smallest:
+            return f"metrics take {smallest} pixels a side"
         measured = image_metrics(
             shown.view.prediction,
             shown.view.reference,

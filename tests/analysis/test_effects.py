@@ -124,7 +124,7 @@ def test_seeds_of_one_method_alone_are_left_out(make_method, tmp_path) -> None:
     for seed in (1, 2):
         make_method("uniform", seed=seed)
     pairs = pair_runs(runs_below(tmp_path), "living-room", "active_exploration", "uniform")
-    assert [(pair.seed, pair.worse.seed) for pair in pairs] == [(1, 1)]
+    assert [(pair.better.seed, pair.worse.seed) for pair in pairs] == [(1, 1)]
 
 
 def test_only_runs_made_in_the_same_way_are_paired(make_method, tmp_path) -> None:

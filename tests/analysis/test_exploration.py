@@ -9,14 +9,13 @@ from analysis.exploration import (
     COLUMNS,
     exploration_numbers,
     exploration_table,
-    histogram_distances,
-    write_exploration_figures,
 )
-from analysis.exploration_plots import PANELS
+from analysis.exploration_plots import PANELS, write_exploration_figures
 from analysis.methods import name_methods
 from analysis.plots import method_styles
 from analysis.runs import Run, find_runs
 from analysis.step_log import mean_over_time
+from analysis.target_map import histogram_distances
 from tests.analysis.conftest import MakeRun
 from tests.analysis.traces import CHAINS, write_maps, write_steps, write_trace
 

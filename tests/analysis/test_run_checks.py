@@ -114,6 +114,14 @@ def of_before_checksums(folder: Path) -> None:
             "metrics.csv, line 3: run_seconds is 1000",
         ),
         (replace_in("result.json", '"set"', '"sets"'), "no 'set'"),
+        (
+            replace_in("result.json", '"logs": {', '"frame": {"samples_per_pixel": 8}, "logs": {'),
+            "no 'milliseconds'",
+        ),
+        (
+            replace_in("result.json", '"logs": {', '"frame_seconds": {"inputs": null}, "logs": {'),
+            "frame_seconds.inputs is 'None'",
+        ),
         (replace_in("result.json", '"seconds": {', '"minutes": {'), "no 'seconds'"),
         (replace_in("result.json", '"patches_traced": ', '"patches_traced": "x", "p": '), "is 'x'"),
         (replace_in("result.json", '"reuse": "self_tuning"', '"reuse": true'), "which is no text"),

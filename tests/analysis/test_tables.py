@@ -135,6 +135,12 @@ def test_numbers_have_three_significant_digits() -> None:
     assert format_estimate(Estimate(0.1234, None, 1)) == "0.123"
 
 
+def test_latex_has_no_sign_that_it_does_not_know() -> None:
+    text = escape("≥9.2 ± 1 – ε ≤")
+    assert text.isascii()
+    assert text.startswith(r"$\ge$9.2")
+
+
 def test_latex_is_escaped() -> None:
     assert escape(r"a_b & 5 % of #1 {x} $ \ ~ ^") == (
         r"a\_b \& 5 \% of \#1 \{x\} \$ \textbackslash{} \textasciitilde{} \textasciicircum{}"

@@ -10,6 +10,7 @@ import yaml
 
 import ngi
 from ngi.cli import VERBS
+from ngi.scene import KINDS
 from tests.docs.pages import ROOT
 
 BESIDE = ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "scenes/LICENSE.md"]
@@ -66,3 +67,9 @@ def test_the_citation_is_of_this_version() -> None:
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
     assert citation["version"] == ngi.__version__
     assert f"## [{ngi.__version__}]" in (ROOT / "CHANGELOG.md").read_text()
+
+
+def test_every_property_of_a_scene_is_in_the_table() -> None:
+    rows = re.findall(r"^\| (`.*?) \|", (ROOT / "docs" / "scenes.md").read_text(), re.MULTILINE)
+    named = {name for row in rows for name in re.findall(r"`(\w+)`", row)}
+    assert KINDS.keys() <= named

@@ -47,6 +47,16 @@ def test_a_line_cut_short_by_a_crash_is_dropped(tmp_path: Path) -> None:
     assert pd.read_csv(path)["step"].tolist() == [1, 2, 3]
 
 
+@pytest.mark.parametrize("header", ["\0\0\0\0", "lo", "step,lo", "\n"])
+def test_a_log_whose_header_a_crash_cut_short_begins_again(tmp_path: Path, header: str) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(header)
+    assert RowLog(path).last_step == 0
+    RowLog(path).keep_until(0)
+    write(path, range(1, 3)).close()
+    assert pd.read_csv(path)["step"].tolist() == [1, 2]
+
+
 def test_missing_values_stay_empty_and_unknown_columns_are_refused(tmp_path: Path) -> None:
     log = write(tmp_path / "log.csv", range(1, 2))
     log.append({"step": 2})

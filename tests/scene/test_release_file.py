@@ -29,7 +29,7 @@ def test_no_depth_is_no_limit(tmp_path) -> None:
 
 
 def test_emitters_are_shown(tmp_path, caplog) -> None:
-    hidden = '<boolean name="hide_emitters" value="true"/>'
+    hidden = '<boolean name="hide_emitters" value="True"/>'
     description = read(tmp_path, BALL + LAMP, integrator=AOV.format(hidden))
     assert description.document.root.find(".//boolean").get("value") == "false"
     assert "hide_emitters" in caplog.text

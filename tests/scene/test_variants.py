@@ -82,6 +82,14 @@ def test_shipped_scenes_are_known_by_name() -> None:
     assert {"sphere-caustic", "mirror"} <= scenes().keys()
 
 
+def test_a_scene_that_nobody_can_read_is_listed_and_harms_no_other(tmp_path, monkeypatch) -> None:
+    (tmp_path / "folder" / "scene.yaml").mkdir(parents=True)
+    monkeypatch.setenv("NGI_SCENES", str(tmp_path))
+    assert {"folder", "mirror"} <= scenes().keys()
+    with pytest.raises((OSError, ValueError), match=r"folder.scene\.yaml"):
+        read_scene(**scenes()["folder"])
+
+
 def test_only_scenes_with_variants_are_read_for_their_names(box, tmp_path, monkeypatch) -> None:
     box([3, 10], "several")
     shutil.copytree(BOX, tmp_path / "single")

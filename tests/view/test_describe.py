@@ -173,6 +173,22 @@ def test_a_plain_file_becomes_a_variable_scene(room, capsys) -> None:
     assert (folder / "scene.yaml").read_text() == before, "an existing scene.yaml was overwritten"
 
 
+@pytest.mark.parametrize("name", ["2024", "a: b", "yes", "#3", "it's, {odd}"])
+def test_names_that_yaml_takes_for_something_else_are_quoted(room, name) -> None:
+    folder = room(FREE)
+    (folder / "scene.yaml").unlink()
+    text = (folder / "scene.xml").read_text()
+    assert '"ball"' in text
+    (folder / "scene.xml").write_text(text.replace('"ball"', f'"{name}"'))
+    moved = folder.rename(folder.parent / name)
+    assert main([f"scene={moved / 'scene.xml'}", "backend=scalar"]) == 0
+    starter = (moved / "scene.yaml").read_text().replace("  # - ", "  - ")
+    (moved / "scene.yaml").write_text(starter)
+    described = read_scene(moved)
+    assert described.name == name
+    assert any(name in variable.objects for variable in described.variables)
+
+
 @pytest.mark.parametrize(
     ("edit", "message"),
     [

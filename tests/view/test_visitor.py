@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import torch
 from skimage.feature import match_template
 from torch import Tensor
 
@@ -138,3 +139,11 @@ def test_pictures_side_by_side_have_their_names_above_them(
         top = np.flatnonzero((half == picture[0, 0]).all(axis=-1).any(axis=1))[0]
         assert (half[:top] > 200).any(), "its name"
         assert match_template(half.mean(-1), picture.mean(-1)).max() > 0.999
+
+
+def test_pictures_too_small_for_the_metrics_are_shown_without(browser: Browser) -> None:
+    for side, said in ((8, "metrics take 11 pixels a side"), (16, "MAPE")):
+        picture = torch.rand(side, side, 3, generator=torch.Generator().manual_seed(0))
+        view: Any = SimpleNamespace(prediction=picture, reference=picture / 2)
+        shown: Any = SimpleNamespace(view=view)
+        assert visitor(browser)._metrics(shown).startswith(said)

@@ -52,7 +52,7 @@ def rewrite_integrator(source: Source) -> None:
         name, value = child.get("name"), child.get("value", "")
         if name == "samples_per_pass":
             integrator.remove(child)
-        elif name == "hide_emitters" and value == "true":
+        elif name == "hide_emitters" and value.lower() == "true":
             source.warn(child, "they are shown all the same")
             child.set("value", "false")
         elif name == "max_depth":
