@@ -279,3 +279,21 @@ def percent(number: float) -> str:
     """Without decimals, as pages have it."""
     rounded = round(number)
     return "0" if rounded == 0 else f"{rounded:+d}".replace("-", "−")
+
+
+def test_what_could_be_gained_in_a_quarter_of_an_hour_is_what_the_runs_say() -> None:
+    runs = pd.read_csv(ROOT / "docs/exploration-ceiling/quarter_hour.csv")
+    uniform, oracle, everything = (row for _, row in runs.iterrows())
+    assert [*runs["choice"]] == ["uniform", "oracle", "uniform"]
+    assert [*runs["patches"]] == [1792, 1792, 4096]
+    shown = rows_of("docs/exploration-ceiling/README.md", "A quarter of an hour")[2:5]
+    columns = {"error": (1, 4), "tail": (1, 4), "relmse": (0.5, 3)}  # root and decimals
+    for row, (column, (power, digits)) in zip(shown, columns.items(), strict=True):
+        names = [f"{frames}_{column}" for frames in ("hard", "uniform")]
+        errors = [uniform[name] ** power for name in names]
+        assert row[0] == " / ".join(f"{error:.{digits}f}" for error in errors)
+        for cell, run in zip(row[1:], (oracle, everything), strict=True):
+            pairs = zip(names, errors, strict=True)
+            changes = [100 * (run[name] ** power / error - 1) for name, error in pairs]
+            text = " / ".join(f"{change:.1f}" for change in changes)
+            assert cell == f"{text} %".replace("-", "−")
