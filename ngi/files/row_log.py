@@ -53,10 +53,7 @@ class RowLog(GrowingFile[TextIO]):
         What a run did after its last checkpoint is done again.
         """
         self.close()
-        if not self.path.exists():
-            return 0
-        lines = self._lines()
-        if not lines:
+        if not (lines := self._lines()):
             return 0
         kept = [line for its_step, line in self._whole_lines() if its_step <= step]
         write_atomically(self.path, "".join(kept).encode())
