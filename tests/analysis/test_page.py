@@ -164,7 +164,7 @@ def test_claims_are_told_in_words_with_their_evidence(claims) -> None:
     assert row["seeds"] == "3"
     assert "1 reproduced" in claims.page.text
     assert "1 not reproduced" in claims.page.text
-    assert "python -m ngi.train -m +sweeps=acceptance" in claims.page.text
+    assert "make report SWEEPS=acceptance" in claims.page.text
 
 
 def test_a_claims_table_has_its_own_methods_only(claims) -> None:
