@@ -38,8 +38,12 @@ class RowLog(GrowingFile[TextIO]):
     @property
     def last_row(self) -> dict[str, str] | None:
         """The last whole one that is on the disk, as text; None where there is none."""
-        whole = self._whole_lines()
-        return next(csv.DictReader([whole[0][1], whole[-1][1]])) if len(whole) > 1 else None
+        lines = self._lines()
+        if (column := _step_column(lines)) is None:
+            return None
+        whole = (line for line in reversed(lines[1:]) if _step(line, column) is not None)
+        last = next(whole, None)
+        return None if last is None else next(csv.DictReader([lines[0], last]))
 
     @property
     def last_step(self) -> int:
@@ -55,7 +59,10 @@ class RowLog(GrowingFile[TextIO]):
         self.close()
         if not (lines := self._lines()):
             return 0
-        kept = [line for its_step, line in self._whole_lines() if its_step <= step]
+        kept = []
+        if (column := _step_column(lines)) is not None:
+            steps = [(_step(line, column), line) for line in lines[1:]]
+            kept = [lines[0], *(line for its, line in steps if its is not None and its <= step)]
         write_atomically(self.path, "".join(kept).encode())
         return len(lines) - len(kept)
 
@@ -64,23 +71,6 @@ class RowLog(GrowingFile[TextIO]):
             return []
         with self.path.open(newline="") as stream:
             return stream.readlines()
-
-    def _whole_lines(self) -> list[tuple[int, str]]:
-        """Each with its step, the header's 0; none where the header is not whole.
-
-        A line cut short by a crash has no newline or step, and its numbers can't be trusted.
-        """
-        lines = self._lines()
-        header = next(csv.reader(lines[:1]), [])
-        if "step" not in header or not lines[0].endswith("\n"):
-            return []
-        position = header.index("step")
-        whole = [(0, lines[0])]
-        for line in lines[1:]:
-            fields = next(csv.reader([line.replace("\0", "")]), [])
-            if line.endswith("\n") and len(fields) > position and fields[position].isdigit():
-                whole.append((int(fields[position]), line))
-        return whole
 
     def _open(self, columns: list[str]) -> None:
         continued = self.path.exists() and self.path.stat().st_size > 0
@@ -97,3 +87,18 @@ class RowLog(GrowingFile[TextIO]):
         )
         if not continued:
             self._writer.writeheader()
+
+
+def _step_column(lines: list[str]) -> int | None:
+    """Where rows have their step; None where the header was cut short by a crash, too."""
+    header = next(csv.reader(lines[:1]), [])
+    return header.index("step") if "step" in header and lines[0].endswith("\n") else None
+
+
+def _step(line: str, column: int) -> int | None:
+    """Of a row; None for one cut short by a crash: it has no newline or step, and its numbers
+    can't be trusted.
+    """
+    fields = next(csv.reader([line.replace("\0", "")]), [])
+    whole = line.endswith("\n") and len(fields) > column and fields[column].isdigit()
+    return int(fields[column]) if whole else None

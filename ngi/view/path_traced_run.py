@@ -11,7 +11,7 @@ from torch import Tensor
 
 from ngi.denoise import Denoiser, OpenImageDenoise, OptixDenoise
 from ngi.methods.path_tracing import PathTracing
-from ngi.view.run_settings import OpenedRun, opened, read_settings, settings_of
+from ngi.view.run_settings import OpenedRun, opened, settings_of
 from ngi.view.trained_run import TrainedRun
 
 DENOISERS = {f"ngi.denoise.{kind.__name__}": kind for kind in (OpenImageDenoise, OptixDenoise)}
@@ -58,7 +58,8 @@ class PathTracedRun(OpenedRun):
 
 def open_run(folder: Path, *, scene_path: Path | str | None = None) -> TrainedRun | PathTracedRun:
     """Whichever of the two the folder holds; raises what their `open` raises."""
-    kind = PathTracedRun if "path_tracing" in read_settings(folder) else TrainedRun
+    with settings_of(folder) as settings:
+        kind = PathTracedRun if "path_tracing" in settings else TrainedRun
     return kind.open(folder, scene_path=scene_path)
 
 

@@ -177,6 +177,11 @@ def test_merged_keys_may_be_overridden(tmp_path) -> None:
         ("</scene>", "", "scene.xml: not well-formed XML"),
         (
             '<integrator type="path">',
+            '<integrator type="path">\n<boolean name="hide_emitters" value="true"/>',
+            "hide_emitters is true",
+        ),
+        (
+            '<integrator type="path">',
             '<integrator type="path">\n<boolean name="hide_emitters" value="True"/>',
             "hide_emitters is true",
         ),

@@ -28,8 +28,9 @@ def test_no_depth_is_no_limit(tmp_path) -> None:
     assert read(tmp_path, BALL + LAMP, integrator='<integrator type="path"/>').max_depth == -1
 
 
-def test_emitters_are_shown(tmp_path, caplog) -> None:
-    hidden = '<boolean name="hide_emitters" value="True"/>'
+@pytest.mark.parametrize("value", ["true", "True"])
+def test_emitters_are_shown(tmp_path, caplog, value: str) -> None:
+    hidden = f'<boolean name="hide_emitters" value="{value}"/>'
     description = read(tmp_path, BALL + LAMP, integrator=AOV.format(hidden))
     assert description.document.root.find(".//boolean").get("value") == "false"
     assert "hide_emitters" in caplog.text

@@ -11,7 +11,7 @@ from ngi.config.configuration import scene_place
 from ngi.files.resources import root
 from ngi.learn import RunFolder
 from ngi.view import trained_run
-from ngi.view.path_traced_run import PathTracedRun
+from ngi.view.path_traced_run import PathTracedRun, open_run
 from ngi.view.run_settings import RENAMED, describe_scene, made_by
 from ngi.view.trained_run import TrainedRun
 from tests.config.command_line import composed
@@ -54,14 +54,16 @@ def test_where_the_scene_is_is_no_part_of_the_identity(tmp_path, monkeypatch) ->
     assert (folder / "settings.json").read_text() == identity
 
 
-@pytest.mark.parametrize("content", ["[]", "{}", '{"scene": 3}'])
-@pytest.mark.parametrize("kind", [TrainedRun, PathTracedRun])
-def test_settings_that_are_no_runs_are_named(tmp_path, monkeypatch, kind, content: str) -> None:
+@pytest.mark.parametrize("content", ["[]", "{}", "3", '{"scene": 3}'])
+@pytest.mark.parametrize("open_folder", [TrainedRun.open, PathTracedRun.open, open_run])
+def test_settings_that_are_no_runs_are_named(
+    tmp_path, monkeypatch, open_folder, content: str
+) -> None:
     (tmp_path / "settings.json").write_text(content)
     (tmp_path / "result.json").write_text("{}")
     monkeypatch.setattr(trained_run, "newest_checkpoint", lambda _: {})
     with pytest.raises(ValueError, match=f"{tmp_path}: settings.json or result.json is damaged"):
-        kind.open(tmp_path)
+        open_folder(tmp_path)
 
 
 READER = '"_target_": "ngi.scene.read_scene"'
