@@ -1,5 +1,9 @@
 import gc
 
+from tests import quick_kernels
+
+quick_kernels.use()
+
 
 def pytest_collection_finish() -> None:
     """What the tests' imports made is not looked at again by every garbage collection.

@@ -5,6 +5,7 @@ process does here is the same from there on: words, folder, environment, output,
 """
 
 import atexit
+import gc
 import multiprocessing
 import os
 import runpy
@@ -54,8 +55,12 @@ def start_module(
     return started
 
 
-def print_to(output: Path) -> None:
-    """What this process prints from now on, and what it starts, ends up in `output`."""
+def begin(output: Path) -> None:
+    """What this process prints from now on, and what it starts, ends up in `output`.
+
+    What was imported is not looked at by its garbage collections, nor copied because of them.
+    """
+    gc.freeze()
     with output.open("a") as stream:
         for descriptor in (1, 2):
             os.dup2(stream.fileno(), descriptor)
@@ -71,7 +76,7 @@ def without_semaphores() -> None:
 def _module(
     module: str, words: tuple[str, ...], folder: Path, environment: dict[str, str], output: Path
 ) -> None:
-    print_to(output)
+    begin(output)
     os.environ.clear()
     os.environ.update(environment)
     os.chdir(folder)

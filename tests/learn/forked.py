@@ -65,7 +65,7 @@ def run(
 
 
 def _work(config: DictConfig, output: Path, first: Callable[[], Any] | None) -> None:
-    warm.print_to(output)
+    warm.begin(output)
     logging.basicConfig(level=logging.INFO, format="%(message)s", force=True)
     torch.set_num_threads(1)
     warm.without_semaphores()
