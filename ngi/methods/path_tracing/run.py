@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 import torch
 from hydra.utils import instantiate
 from omegaconf import DictConfig
+from torch import Tensor
 
 from ngi.clock.phase_clock import PAUSES, PHASES
-from ngi.config.build import plain
+from ngi.config.build import build_network, build_samples, plain
 from ngi.config.configuration import scene_place
 from ngi.files.code_versions import record_code_version
 from ngi.machine.provenance import provenance
@@ -114,9 +115,8 @@ class _Frames:
         renderer = tracing.renderer
         self._tracing = tracing
         self._times = FrameTimes(list(renderer.hard_frames()))
-        network = instantiate(config.model)(
-            layout=renderer.layout, scene_dimensions=renderer.dimensions
-        ).eval()
+        samples = build_samples(config, renderer=renderer)
+        network = build_network(config, samples=samples).eval()
         network = network.to("cuda" if torch.cuda.is_available() else "cpu")
         reduced = config.trainer.precision == "bf16-mixed"
         precision = torch.bfloat16 if reduced else torch.float32
@@ -124,7 +124,12 @@ class _Frames:
         self._trace: Frame = partial(tracing.trace, resolution=resolution)
         buffers = renderer.image_buffers(renderer.hard_frames()[0], resolution=resolution).cpu()
         noisy = tracing.trace(renderer.hard_frames()[0], resolution=resolution)
-        self._network: Frame = lambda v: show(network, buffers, v, precision)
+
+        def predict(v: Tensor) -> Tensor:
+            (seen,) = samples.test_inputs(v, resolution=resolution)
+            return show(network, buffers, seen, precision)
+
+        self._network: Frame = predict
         self._denoise: Frame = lambda _: tracing.denoise(noisy, buffers)
 
     def fit(self, milliseconds: float | None) -> None:

@@ -8,12 +8,16 @@ from math import pi
 from pathlib import Path
 
 import pytest
+import torch
 from hydra.errors import InstantiationException
+from torch import Tensor, nn
 
 from analysis.frame_times import frame_table
 from analysis.methods import name_methods
 from analysis.report import write_report
 from analysis.runs import comparison_warnings, find_runs
+from ngi.methods.path_tracing.frame_time import show
+from ngi.render import AnalyticRenderer
 from ngi.train import train
 from ngi.view.trained_run import TrainedRun
 from tests.learn.command_line import SMALL
@@ -82,6 +86,24 @@ def test_a_frame_is_timed_in_its_parts(runs: Path) -> None:
     assert ms["path tracing"] == pytest.approx(ms["paths"])  # no denoiser, no buffers
     assert ms["network"] == pytest.approx(ms["buffers"] + ms["network alone"])
     assert all(value >= 0 for value in ms.values())
+
+
+def test_the_network_beside_it_is_the_one_that_would_be_trained(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Here without the first component of v, which the renderer says places the camera."""
+    given = []
+
+    def seen(network: nn.Module, buffers: Tensor, v: Tensor, precision: torch.dtype) -> Tensor:
+        given.append(v)
+        return show(network, buffers, v, precision)
+
+    monkeypatch.setattr(AnalyticRenderer, "camera_part", slice(0, 1), raising=False)
+    monkeypatch.setattr("ngi.methods.path_tracing.run.show", seen)
+    options = ("method=path_tracing_8spp", "data=patches_without_camera", "renderer.dimensions=3")
+    run(tmp_path, "run", *options)
+    frames = AnalyticRenderer(dimensions=3, patch_size=16).hard_frames()
+    assert {tuple(v.tolist()) for v in given} == {tuple(v[1:].tolist()) for v in frames}
 
 
 def test_a_finished_run_is_not_made_again_and_an_unfinished_one_is(runs: Path) -> None:
