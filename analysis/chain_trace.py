@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy import stats
 
 from analysis.records import read_records
 from analysis.runs import Run
+
+if TYPE_CHECKING:
+    from scipy import stats
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,8 @@ class ChainTrace:
 
         States that chains still hold at the end live longer than is known: they are censored.
         """
+        from scipy import stats  # slow to import, and most runs have no chains
+
         complete, censored = [], []
         for accepted in self.accepted.T:
             entries = np.flatnonzero(accepted)
@@ -80,6 +84,8 @@ class ChainTrace:
 
     def survival(self) -> tuple[np.ndarray, np.ndarray]:
         """Lifetimes, ascending, and the part of the states that outlive each (Kaplan and Meier)."""
+        from scipy import stats
+
         curve = stats.ecdf(self.lifetimes()).sf
         return curve.quantiles, curve.probabilities
 
