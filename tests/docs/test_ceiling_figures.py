@@ -1,0 +1,84 @@
+"""The tables of docs/exploration-ceiling are those of its runs."""
+
+import math
+
+import numpy as np
+import pandas as pd
+
+from analysis.runs import METRICS
+from tests.docs.pages import ROOT
+from tests.docs.test_figures import geometric_mean
+
+
+def rows_of(page: str, section: str) -> list[list[str]]:
+    """Cells of the tables in a section, bold or not, without the first of each row."""
+    text = (ROOT / page).read_text().split(f"## {section}")[1].split("\n## ")[0]
+    lines = [line.replace("*", "") for line in text.splitlines() if line.startswith("| ")]
+    return [[cell.strip() for cell in line.split("|")[2:-1]] for line in lines]
+
+
+def test_the_tables_of_the_rare_with_clean_patches_are_of_its_runs() -> None:
+    runs = pd.read_csv(ROOT / "docs/exploration-ceiling/rare_256.csv").set_index(["method", "seed"])
+    shown = rows_of("docs/exploration-ceiling/rare.md", "With clean patches")
+    for method, rows in (("ours_eager", shown[2:4]), ("ours_exploring", shown[4:6])):
+        for frames, row in zip(("hard", "uniform"), rows, strict=True):
+            error = geometric_mean(runs, frames)
+            base = error["ours", 0].to_numpy()
+            seeds = error[method].groupby("seed")
+            changes = [100 * own.to_numpy() / base - 100 for _, own in seeds]
+            assert row == [", ".join(map(percent, each)) for each in zip(*changes, strict=True)]
+    last = runs.groupby(level=["method", "seed"]).last()
+    for method, frames, row in (
+        ("ours_eager", "hard", shown[8]),
+        ("ours_eager", "uniform", shown[9]),
+        ("ours_exploring", "uniform", shown[11]),
+    ):
+        names = [f"{frames}_{name}" for name in ("mape", "dssim", "mae", "lpips", "relmse")]
+        change = last.loc[method, names] / last.loc[("ours", 0), names]
+        change[names[-1]] **= 0.5
+        assert row == [", ".join(map(percent, 100 * change[name] - 100)) for name in names]
+
+
+def test_what_is_said_of_who_knows_where_the_rare_is_is_what_the_runs_say() -> None:
+    runs = pd.read_csv(ROOT / "docs/exploration-ceiling/rare_known.csv").query("step == 3000")
+    known = rows_of("docs/exploration-ceiling/rare.md", "What could be had")[2]
+    for frames, cell in zip(("hard", "uniform"), known[1:], strict=True):
+        error = runs.set_index(["share_known", "seed"])[f"{frames}_error"]
+        change = 100 * error[0.5] / error[0.0] - 100
+        errors = ", ".join(f"{own:.4f}" for own in error[0.5])
+        assert cell == f"{errors}: {', '.join(map(percent, change))} %"
+
+
+def test_the_papers_learner_where_patches_are_dear_is_said_to_be_what_its_runs_say() -> None:
+    runs = pd.read_csv(ROOT / "docs/exploration-ceiling/scarce_paper.csv").set_index("method")
+    ways = (("hard", ""), ("hard", "_worst5"), ("uniform", ""))
+    _, _, *shown = rows_of("docs/exploration-ceiling/scarce.md", "With the paper's learner")
+    for row, (frames, worst) in zip(shown, ways, strict=True):
+        names = [f"{frames}_{metric}{worst}" for metric in METRICS]
+        error = np.log(runs[names]).mean(axis=1).map(math.exp)
+        change = 100 * error["active_exploration"].to_numpy() / error["uniform"].to_numpy() - 100
+        assert row == [f"{each:+.1f} %".replace("-", "−") for each in change]
+
+
+def percent(number: float) -> str:
+    """Without decimals, as pages have it."""
+    rounded = round(number)
+    return "0" if rounded == 0 else f"{rounded:+d}".replace("-", "−")
+
+
+def test_what_could_be_gained_in_a_quarter_of_an_hour_is_what_the_runs_say() -> None:
+    runs = pd.read_csv(ROOT / "docs/exploration-ceiling/quarter_hour.csv")
+    uniform, oracle, everything = (row for _, row in runs.iterrows())
+    assert [*runs["choice"]] == ["uniform", "oracle", "uniform"]
+    assert [*runs["patches"]] == [1792, 1792, 4096]
+    shown = rows_of("docs/exploration-ceiling/README.md", "A quarter of an hour")[2:5]
+    columns = {"error": (1, 4), "tail": (1, 4), "relmse": (0.5, 3)}  # root and decimals
+    for row, (column, (power, digits)) in zip(shown, columns.items(), strict=True):
+        names = [f"{frames}_{column}" for frames in ("hard", "uniform")]
+        errors = [uniform[name] ** power for name in names]
+        assert row[0] == " / ".join(f"{error:.{digits}f}" for error in errors)
+        for cell, run in zip(row[1:], (oracle, everything), strict=True):
+            pairs = zip(names, errors, strict=True)
+            changes = [100 * (run[name] ** power / error - 1) for name, error in pairs]
+            text = " / ".join(f"{change:.1f}" for change in changes)
+            assert cell == f"{text} %".replace("-", "−")
