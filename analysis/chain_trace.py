@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import scipy
 
 from analysis.records import read_records
 from analysis.runs import Run
-
-if TYPE_CHECKING:
-    from scipy import stats
 
 
 @dataclass(frozen=True)
@@ -65,13 +63,11 @@ class ChainTrace:
             selected = selected & (self.large_step == large_step)
         return float(self.accepted[selected].mean()) if selected.any() else float("nan")
 
-    def lifetimes(self) -> stats.CensoredData:
+    def lifetimes(self) -> scipy.stats.CensoredData:
         """Of every state, the proposals made from it, that which was accepted included.
 
         States that chains still hold at the end live longer than is known: they are censored.
         """
-        from scipy import stats  # slow to import, and most runs have no chains
-
         complete, censored = [], []
         for accepted in self.accepted.T:
             entries = np.flatnonzero(accepted)
@@ -80,13 +76,11 @@ class ChainTrace:
         alive = np.concatenate(censored)
         lengths = np.concatenate([*complete, alive[alive > 0]])
         unfinished = np.arange(len(lengths)) >= len(lengths) - int((alive > 0).sum())
-        return stats.CensoredData.right_censored(lengths, unfinished)
+        return scipy.stats.CensoredData.right_censored(lengths, unfinished)
 
     def survival(self) -> tuple[np.ndarray, np.ndarray]:
         """Lifetimes, ascending, and the part of the states that outlive each (Kaplan and Meier)."""
-        from scipy import stats
-
-        curve = stats.ecdf(self.lifetimes()).sf
+        curve = scipy.stats.ecdf(self.lifetimes()).sf
         return curve.quantiles, curve.probabilities
 
     def median_lifetime(self) -> float:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy import special  # scipy.stats takes as long to import as all of pandas
+import scipy  # scipy.stats takes as long to import as pandas, and waits for its first use
 
 LEVEL = 0.95
 
@@ -35,7 +35,7 @@ def estimate(values: Sequence[float]) -> Estimate:
     if n == 1 or not math.isfinite(mean):
         return Estimate(mean, None, n)
     standard_error = numbers.std(ddof=1) / math.sqrt(n)
-    quantile = special.stdtrit(n - 1, 0.5 + LEVEL / 2)
+    quantile = scipy.stats.t.ppf(0.5 + LEVEL / 2, df=n - 1)
     return Estimate(mean, float(quantile * standard_error), n)
 
 
@@ -89,7 +89,7 @@ def bootstrap_interval(
         means = values[generator.integers(n, size=(resamples, n))].mean(axis=1)
         deviations += math.sqrt(n / (n - 1)) * (means - values.mean())
     tail = 0.5 - confidence / 2
-    stretch = special.stdtrit(degrees, tail) / special.ndtri(tail)
+    stretch = scipy.stats.t.ppf(tail, degrees) / scipy.stats.norm.ppf(tail)
     low, high = centre + stretch * np.quantile(deviations, [tail, 1 - tail])
     return float(low), float(high)
 
@@ -116,8 +116,6 @@ def seeds_to_decide(differences: np.ndarray, *, power: float = 0.8, most: int = 
     the true ones, the non-central t distribution says how often n seeds would show it. The spread
     between frames stays, however many seeds there are. None where more than `most` are needed.
     """
-    from scipy import stats
-
     seeds, frames = differences.shape
     by_seed, by_frame = differences.mean(axis=1), differences.mean(axis=0)
     n = np.arange(2, most + 1)
@@ -133,6 +131,6 @@ def seeds_to_decide(differences: np.ndarray, *, power: float = 0.8, most: int = 
         terms = variance_of_seeds**2 / (n - 1) + variance_of_frames**2 / (frames - 1)
         degrees = variance**2 / np.maximum(terms, np.finfo(float).tiny)
     centrality = abs(differences.mean()) / np.sqrt(np.maximum(variance, np.finfo(float).tiny))
-    critical = special.stdtrit(degrees, 0.5 + LEVEL / 2)
-    enough = stats.nct.sf(critical, degrees, centrality) >= power
+    critical = scipy.stats.t.ppf(0.5 + LEVEL / 2, degrees)
+    enough = scipy.stats.nct.sf(critical, degrees, centrality) >= power
     return int(n[enough][0]) if enough.any() else None

@@ -1,11 +1,7 @@
 """The tables of docs/exploration-ceiling are those of its runs."""
 
-import math
-
-import numpy as np
 import pandas as pd
 
-from analysis.runs import METRICS
 from tests.docs.pages import ROOT
 from tests.docs.test_figures import geometric_mean
 
@@ -54,8 +50,7 @@ def test_the_papers_learner_where_patches_are_dear_is_said_to_be_what_its_runs_s
     ways = (("hard", ""), ("hard", "_worst5"), ("uniform", ""))
     _, _, *shown = rows_of("docs/exploration-ceiling/scarce.md", "With the paper's learner")
     for row, (frames, worst) in zip(shown, ways, strict=True):
-        names = [f"{frames}_{metric}{worst}" for metric in METRICS]
-        error = np.log(runs[names]).mean(axis=1).map(math.exp)
+        error = geometric_mean(runs, frames, worst)
         change = 100 * error["active_exploration"].to_numpy() / error["uniform"].to_numpy() - 100
         assert row == [f"{each:+.1f} %".replace("-", "−") for each in change]
 

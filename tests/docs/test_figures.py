@@ -39,9 +39,9 @@ def said(page: str, pattern: str) -> tuple[str, ...]:
     return found.groups()
 
 
-def geometric_mean(evaluations: pd.DataFrame, frames: str) -> pd.Series:
-    """Of the metrics on "hard" or "uniform" frames."""
-    metrics = [f"{frames}_{metric}" for metric in METRICS]
+def geometric_mean(evaluations: pd.DataFrame, frames: str, worst: str = "") -> pd.Series:
+    """Of the metrics on "hard" or "uniform" frames; worst: "_worst5" for the worst 5 % of them."""
+    metrics = [f"{frames}_{metric}{worst}" for metric in METRICS]
     return np.log(evaluations[metrics]).mean(axis=1).map(math.exp)
 
 
