@@ -81,7 +81,7 @@ def histogram_follows_target(runs: Sequence[Run]) -> list[Finding]:
         findings.append(_finding(text, changes[method].dropna()))
         beyond = changes[method] - changes["uniform"]
         findings.append(_finding(f"{text}, beyond uniform's change", beyond.dropna()))
-    return [finding for finding in findings if finding is not None]
+    return findings
 
 
 def error_still_falls(runs: Sequence[Run]) -> list[Finding]:
@@ -145,10 +145,10 @@ def _log_change(run: Run, keys: Sequence[str]) -> float:
     return float(np.mean([log_error(b) - log_error(a) for a, b in zip(first, last, strict=True)]))
 
 
-def _finding(text: str, values: pd.Series) -> Finding | None:
-    """The mean of a value per seed, claimed to be negative; None without any."""
+def _finding(text: str, values: pd.Series) -> Finding:
+    """The mean of a value per seed, claimed to be negative; inconclusive without any."""
     if values.empty:
-        return None
+        return Finding(text, math.nan, None, None, Verdict.INCONCLUSIVE)
     low = high = None
     mean = float(values.mean())
     if len(values) > 1:

@@ -9,6 +9,7 @@ writes of runs of `sweeps/learner`, and frames.json of `ngi benchmark frames`.
 
 from __future__ import annotations
 
+import argparse
 import json
 import sys
 from collections.abc import Mapping, Sequence
@@ -135,6 +136,9 @@ def with_frames(page: str, benchmark: Mapping[str, Any]) -> str:
 @errors_in_a_line
 def main() -> int:
     """Entry point; returns the exit status."""
+    argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    ).parse_args()
     results = pd.read_csv(RESULTS)
     for page in PAGES:
         page.write_text(written(page.read_text(), results, page))

@@ -13,7 +13,7 @@ import hydra
 from hydra.utils import instantiate
 from omegaconf import DictConfig
 
-from ngi.config.build import build_recorder, build_run, plain, run_costs
+from ngi.config.build import build_recorder, build_run, plain, run_costs, training_device
 from ngi.config.configuration import register, run_settings, scene_place
 from ngi.config.hydra_program import MESSAGES, completed, fail, run_program, with_overrides
 from ngi.config.outline import only_bootstrap, outline
@@ -67,7 +67,7 @@ def train(config: DictConfig) -> dict[str, Any]:
                 from ngi.methods.path_tracing.run import run_path_tracing
 
                 return run_path_tracing(config, renderer=renderer, folder=folder, tracker=tracker)
-            log.info("%s", outline(plain(config)))
+            log.info("%s", outline(plain(config), device=training_device(config)))
             run = build_run(
                 config,
                 folder=folder,

@@ -22,7 +22,7 @@ from unittest import mock
 CONTEXT = multiprocessing.get_context("forkserver")
 PRELOADED = [
     *("pytest", "ngi.train", "ngi.learn", "matplotlib.pyplot", "torch._dynamo", "tqdm"),
-    *("tests.learn.forked", __name__),
+    *("tests.learn.forked", "tests.warmed", __name__),
 ]
 
 

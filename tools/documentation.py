@@ -66,10 +66,12 @@ def commands() -> str:
         "left out: `ngi describe mirror` is `ngi describe scene=mirror`.\n\n"
         f"{table}\n\n"
         "Further programs, for studies of the method itself, are started as modules: "
-        "`python -m ngi.studies.noise`, `python -m ngi.studies.exploration_map`, "
-        "`python -m analysis.exploration_map`, `python -m analysis.endurance`.\n\n"
-        "The exit status is 0 where all went well, 1 where the work failed, 2 for a wrong command "
-        "or value, 130 after Ctrl-C, 143 after SIGTERM.\n"
+        "`python -m ngi.studies.noise`, `python -m ngi.studies.exploration_map` with "
+        "`python -m analysis.exploration_map`, `python -m ngi.studies.ceiling` with "
+        "`python -m analysis.ceiling`, `python -m analysis.endurance`.\n\n"
+        "The exit status is 0 where all went well, 130 after Ctrl-C, 143 after SIGTERM, and 1 or 2 "
+        "else. Of `describe`, `doctor`, `metrics` and `stability` 1 says that something was found, "
+        "2 that it could not be looked for.\n"
     )
 
 

@@ -123,6 +123,14 @@ def _table(result: Mapping[str, Any], frames: Frames) -> str:
     return table
 
 
+def _read(file: Path) -> dict[str, Any]:
+    try:
+        result: dict[str, Any] = json.loads(file.read_text())
+    except ValueError as error:
+        raise ValueError(f"{file} is damaged: {error}") from error
+    return result
+
+
 def check(options: MetricsOptions) -> int:
     """Prints what was found; 0 where all agrees, 1 where not, 2 where a run cannot be checked.
 
@@ -135,8 +143,8 @@ def check(options: MetricsOptions) -> int:
     lpips = Lpips(weights=options.lpips_weights or os.environ.get("NGI_LPIPS_WEIGHTS"))
     status = 0
     for file in files:
-        result = json.loads(file.read_text())
         try:
+            result = _read(file)
             frames = recomputed(file.parent, result, lpips=lpips)
         except ValueError as error:
             print(error, file=sys.stderr)

@@ -21,9 +21,10 @@ def option(text: str, default: Any = MISSING) -> Any:
 
 
 def read_options(kind: type[Options], program: str, arguments: Sequence[str]) -> Options:
-    """A `kind`, whose fields are made by `option`, from `key=value` arguments; lists are `[a,b]`.
+    """A `kind`, whose fields are made by `option`, from `key=value` arguments.
 
-    Words without a key are the value of the first field, which takes several if it is a list.
+    A list is `[a,b]`, or its key given once for each item, whatever characters that has. Words
+    without a key are the value of the first field, which takes several if it is a list.
     Ends the program with status 0 where help is asked for, its text being `kind`'s docstring and
     its fields', and with status 2 and a message for an unknown or missing key or a wrong value.
     """
@@ -31,13 +32,21 @@ def read_options(kind: type[Options], program: str, arguments: Sequence[str]) ->
         print(_help(kind, program))
         sys.exit(0)
     entries = {entry.name: str(entry.type) for entry in fields(cast("Any", kind))}
-    given: dict[str, str] = {}
-    for word in _with_key(arguments, *next(iter(entries.items()), ("", ""))):
+    given: dict[str, list[str]] = {}
+    for word in _with_key(arguments, next(iter(entries), "")):
         key, equals, text = word.partition("=")
         if key not in entries or not equals:
-            _refuse(program, f"'{key}' is no option; there are {', '.join(sorted(entries))}")
-        given[key] = text
-    values = {k: _list(v) if entries[k].startswith("list") else v for k, v in given.items()}
+            known = f"there are {', '.join(sorted(entries))}" if entries else "there are none"
+            _refuse(program, f"'{key}' is no option; {known}")
+        given.setdefault(key, []).append(text)
+    values: dict[str, str | list[str]] = {}
+    for key, texts in given.items():
+        if entries[key].startswith("list"):
+            values[key] = [item for text in texts for item in _items(text)]
+        elif len(texts) == 1:
+            values[key] = texts[0]
+        else:
+            _refuse(program, f"'{key}' takes one value, not {' and '.join(texts)}")
     try:
         return TypeAdapter(kind).validate_python(values)
     except ValidationError as error:
@@ -45,20 +54,20 @@ def read_options(kind: type[Options], program: str, arguments: Sequence[str]) ->
         key = str(first["loc"][0])
         if key not in given:
             _refuse(program, f"give {key}=…")
-        _refuse(program, f"'{key}={given[key]}' is wrong: {first['msg'].lower()}")
+        _refuse(program, f"'{key}={' '.join(given[key])}' is wrong: {first['msg'].lower()}")
 
 
-def _list(text: str) -> list[str]:
-    return [item.strip() for item in text.strip("[]").split(",")]
+def _items(text: str) -> list[str]:
+    """Of `[a,b]`, or the text itself: run folders have commas in their names."""
+    if not (text.startswith("[") and text.endswith("]")):
+        return [text]
+    return [item.strip() for item in text[1:-1].split(",")]
 
 
-def _with_key(words: Sequence[str], key: str, kind: str) -> list[str]:
-    """Words of a command line, those that have no key gathered as the value of this one."""
-    bare = [word for word in words if not re.match(r"-|\w+=", word)]
-    rest = [word for word in words if word not in bare]
-    if bare and kind.startswith("list"):
-        return [f"{key}={','.join(bare)}", *rest]
-    return [*(f"{key}={word}" for word in bare[:1]), *bare[1:], *rest]
+def _with_key(words: Sequence[str], key: str) -> list[str]:
+    """Words of a command line, those that have none given this key."""
+    named = r"-|\w+=" if key else ""
+    return [word if re.match(named, word) else f"{key}={word}" for word in words]
 
 
 def check_output(out: Path, *suffixes: str) -> None:

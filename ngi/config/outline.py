@@ -7,10 +7,11 @@ from typing import Any
 from ngi.machine.size import usable_cores
 
 
-def outline(config: Mapping[str, Any]) -> str:
+def outline(config: Mapping[str, Any], *, device: str) -> str:
     """Method, time, machine, network, patches and reuse of a run, in one line.
 
     config: of a run that trains a network, resolved, with its label
+    device: that it trains on
     """
     value = partial(_value, config)
     steps, seconds = value("budget.steps"), value("budget.seconds")
@@ -21,7 +22,8 @@ def outline(config: Mapping[str, Any]) -> str:
     limits = [f"{steps} steps"] if steps is not None else []
     if seconds is not None:
         limits.append(f"{seconds:g} s")
-    machine = f"{usable_cores()} cores ({value('trainer.precision')})"
+    gpu = "a GPU and " if device == "cuda" else ""
+    machine = f"{gpu}{usable_cores()} cores ({value('trainer.precision')})"
     parts = [
         value("label.method") or value("label.sampler"),
         f"{' or '.join(limits)} on {machine}",

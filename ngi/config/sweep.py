@@ -32,6 +32,7 @@ from ngi.config.sweep_plan import (
     shown,
     table,
 )
+from ngi.files.durable import write_atomically
 
 NOT_COMPOSED = (HydraException, OmegaConfBaseException)
 """What is raised where the configuration of a job cannot be put together."""
@@ -69,7 +70,8 @@ class Sweep(Callback):
         if self._notes is None or not self._notes.is_dir():
             return  # a run alone
         note = {"folder": str(config.run.folder), "failure": _failure(job_return)}
-        (self._notes / f"{config.hydra.job.num}.json").write_text(json.dumps(note))
+        # another job of the sweep may read it meanwhile
+        write_atomically(self._notes / f"{config.hydra.job.num}.json", json.dumps(note).encode())
         if self._runs:
             ended = self._ended()
             failed = sum(note["failure"] is not None for note in ended.values())

@@ -25,7 +25,7 @@ from ngi.config.configuration import run_settings
 from ngi.config.hydra_program import MESSAGES
 from ngi.files.code_versions import code_version, code_versions, same_program
 from ngi.files.row_log import RowLog
-from ngi.files.run_folder import longer
+from ngi.files.run_folder import RESULT, SETTINGS, has_something, kept_settings, longer
 from ngi.learn import Budget, CostFile, ModelClock
 
 
@@ -87,7 +87,8 @@ def planned_run(config: DictConfig, costs: dict[str, float | None]) -> Planned:
         done = _done(folder, budget) if state in ("interrupted", "longer") else 0.0
         left = 0.0 if "path_tracing" in config else _left(config, budget, done, costs)
     except (*MESSAGES, HydraException, OmegaConfBaseException) as error:
-        cause = error.__cause__ or error
+        wrapped = error.__cause__ if isinstance(error, HydraException) else None
+        cause = wrapped or error
         return Planned(folder, f"cannot start: {str(cause).splitlines()[0]}", 0.0, None)
     if state == "finished":
         done, left = 1.0, 0.0
@@ -96,27 +97,32 @@ def planned_run(config: DictConfig, costs: dict[str, float | None]) -> Planned:
 
 def _state(config: DictConfig, folder: Path) -> str:
     """As `RunFolder` will find it, but for scenes and costs that have changed meanwhile."""
-    made = [folder / name for name in ("result.json", "last.ckpt", "previous.ckpt")]
-    if not any(file.exists() for file in made):
+    if not has_something(folder):
         return "new"
-    there = json.loads((folder / "settings.json").read_text())
-    try:
-        known = {"scene_hash": there["scene"]["hash"], "costs": there["costs"]}
-    except (KeyError, TypeError):
-        raise ValueError(f"{folder / 'settings.json'} is no run's; delete the folder") from None
-    ours = run_settings(config, **known)
-    is_longer = longer(ours, than=there)
-    if ours != there and not is_longer:
-        raise ValueError("its folder holds another run; choose one with run.folder=…, or delete it")
+    there = kept_settings(folder)
+    is_longer = there is not None and _is_longer(config, there, folder)
     versions = code_versions(folder)
     if versions and not same_program(versions[-1], code_version()):
         if config.run.on_code_change == "restart":
             return "again"
         if config.run.on_code_change == "refuse":
             raise ValueError("the program has changed since, and run.on_code_change=refuse")
-    if not made[0].exists():
+    if not (folder / RESULT).exists():
         return "interrupted"
     return "longer" if is_longer else "finished"
+
+
+def _is_longer(config: DictConfig, there: Any, folder: Path) -> bool:
+    """Whether its budget is larger than in these settings; ValueError for those of another run."""
+    try:
+        known = {"scene_hash": there["scene"]["hash"], "costs": there["costs"]}
+    except (KeyError, TypeError):
+        raise ValueError(f"{folder / SETTINGS} is no run's; delete the folder") from None
+    ours = run_settings(config, **known)
+    is_longer = longer(ours, than=there)
+    if ours != there and not is_longer:
+        raise ValueError("its folder holds another run; choose one with run.folder=…, or delete it")
+    return is_longer
 
 
 def _done(folder: Path, budget: Budget) -> float:

@@ -18,7 +18,7 @@ FILE = "commits.json"
 def code_version() -> dict[str, Any]:
     """'commit' (None outside git), 'dirty', and 'code', a hash over this package's modules.
 
-    As they are when it is first asked for: a process loads its modules once.
+    As they are when it is first asked for.
     """
     commit, dirty = code_commit()
     return {"commit": commit, "dirty": dirty, "code": code_hash()}

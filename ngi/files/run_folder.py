@@ -15,6 +15,11 @@ from ngi.files.durable import write_atomically
 from ngi.files.record_log import CHAINS, TARGET_MAPS, RecordLog
 from ngi.files.row_log import RowLog
 
+SETTINGS, RESULT = "settings.json", "result.json"
+LAST, PREVIOUS = "last.ckpt", "previous.ckpt"
+STABLE = "stable.ckpt"
+"""The last checkpoint before the learning rate decayed."""
+CHECKPOINTS = (LAST, PREVIOUS, STABLE)
 TRACKED = "tracker.json"
 """By which trackers know the run: see `ngi.learn.remote_tracker.kept_id`."""
 
@@ -42,18 +47,17 @@ class RunFolder:
         self.linear_megabytes = linear_megabytes
         canonical = json.dumps(_without_limits(settings)[0], sort_keys=True)
         self.identity = hashlib.sha256(canonical.encode()).hexdigest()[:16]
-        self.checkpoint = path / "last.ckpt"
-        self.previous_checkpoint = path / "previous.ckpt"
-        self.stable_checkpoint = path / "stable.ckpt"  # the last before the learning rate decayed
-        self._checkpoints = (self.checkpoint, self.previous_checkpoint, self.stable_checkpoint)
+        self.checkpoint = path / LAST
+        self.previous_checkpoint = path / PREVIOUS
+        self.stable_checkpoint = path / STABLE
         self.patches = path / "patches"
         self.metrics = RowLog(path / "metrics.csv")
         self.steps = RowLog(path / "steps.csv")
         self.chains = RecordLog(path / "chains.bin", description=CHAINS)
         self.target_maps = RecordLog(path / "target_map.bin", description=TARGET_MAPS)
         self.logs = (self.steps, self.metrics, self.chains, self.target_maps)
-        self._result = path / "result.json"
-        self._settings = path / "settings.json"
+        self._result = path / RESULT
+        self._settings = path / SETTINGS
         self.lengthened = False
         self.restarted = False
         self._lock = self._acquire_lock()
@@ -80,8 +84,8 @@ class RunFolder:
 
     @property
     def has_something(self) -> bool:
-        """Whether there is a result or a checkpoint; before that there is nothing to lose."""
-        return any(file.exists() for file in (*self._checkpoints, self._result))
+        """See `has_something`."""
+        return has_something(self.path)
 
     def begin(self, *, scene_place: dict[str, Any] | None = None) -> None:
         """Makes the folder this run's, once everything is built and training can start.
@@ -100,7 +104,8 @@ class RunFolder:
         """Deletes what this run would go on with; checkpoints first, on which the rest depends."""
         logs = (log.path for log in self.logs)
         others = (self.path / name for name in (code_versions.FILE, TRACKED))
-        for file in (*self._checkpoints, self._result, *logs, *others):
+        checkpoints = (self.path / name for name in CHECKPOINTS)
+        for file in (*checkpoints, self._result, *logs, *others):
             file.unlink(missing_ok=True)
         shutil.rmtree(self.patches, ignore_errors=True)
 
@@ -146,16 +151,13 @@ class RunFolder:
         return lock
 
     def _check_identity(self) -> None:
-        if not (self._settings.exists() and self.has_something):
-            return
         try:
-            earlier = json.loads(self._settings.read_text())
-        except ValueError as error:
+            earlier = kept_settings(self.path)
+        except ValueError:
             self._lock.close()
-            raise ValueError(
-                f"{self._settings} is damaged ({error}); delete it if you are sure that this "
-                "folder holds the same run"
-            ) from error
+            raise
+        if earlier is None:
+            return
         if isinstance(earlier, dict) and longer(self.settings, than=earlier):
             self.lengthened = True
             return
@@ -172,6 +174,28 @@ class RunFolder:
                 f"{'; …' if len(different) > 3 else ''}); choose another folder with run.folder=…, "
                 "or delete that one"
             )
+
+
+def has_something(folder: Path) -> bool:
+    """Whether there is a result or a checkpoint; before that there is nothing to lose."""
+    return any((folder / name).exists() for name in (*CHECKPOINTS, RESULT))
+
+
+def kept_settings(folder: Path) -> Any:
+    """Of the run that a folder holds; None where there is nothing to lose, or they are not there.
+
+    Raises ValueError where they cannot be read.
+    """
+    file = folder / SETTINGS
+    if not (file.exists() and has_something(folder)):
+        return None
+    try:
+        return json.loads(file.read_text())
+    except ValueError as error:
+        raise ValueError(
+            f"{file} is damaged ({error}); delete it if you are sure that this folder holds the "
+            "same run"
+        ) from error
 
 
 def longer(settings: dict[str, Any], *, than: dict[str, Any]) -> bool:

@@ -15,6 +15,7 @@ from ngi.learn.checkpoint import (
 )
 from ngi.learn.datamodule import ExplorationDataModule
 from ngi.learn.interruption import Interrupted, Interruption
+from ngi.learn.learning_rate import BaseRates
 from ngi.learn.lightning_trackers import MLflow, TensorBoard
 from ngi.learn.module import IlluminationModule, seeded
 from ngi.learn.outcome import Outcome, Step
@@ -33,6 +34,7 @@ from ngi.learn.wandb_tracker import WeightsAndBiases
 __all__ = [
     "LARGEST_NORM",
     "AtomicCheckpointIO",
+    "BaseRates",
     "Batch",
     "Budget",
     "Component",

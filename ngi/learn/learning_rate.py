@@ -2,8 +2,23 @@
 
 from typing import Any
 
+from torch.optim import Optimizer
+
 from ngi.learn.lightning_api import Callback, LightningModule, Trainer
 from ngi.learn.run import Run
+
+
+class BaseRates:
+    """The learning rates that an optimiser has when this is made, one per group."""
+
+    def __init__(self, optimizer: Optimizer) -> None:
+        self._optimizer = optimizer
+        self._rates = [group["lr"] for group in optimizer.param_groups]
+
+    def scale(self, factor: float) -> None:
+        """The next step is taken at so many times these rates."""
+        for group, rate in zip(self._optimizer.param_groups, self._rates, strict=True):
+            group["lr"] = rate * factor
 
 
 class LearningRate(Callback):
@@ -15,26 +30,19 @@ class LearningRate(Callback):
 
     def __init__(self, run: Run) -> None:
         self._run = run
-        self._rates: list[float] = []
+        self._base: BaseRates
 
     def on_fit_start(self, trainer: Trainer, _module: LightningModule) -> None:
         # As configured: the checkpoint, whose rates may have fallen already, is not loaded yet.
-        self._rates = [group["lr"] for group in _groups(trainer)]
+        (optimizer,) = trainer.optimizers
+        self._base = BaseRates(optimizer)
 
-    def on_train_start(self, trainer: Trainer, *_: Any) -> None:
-        self._set(trainer)
+    def on_train_start(self, *_: Any) -> None:
+        self._set()
 
-    def on_train_batch_end(self, trainer: Trainer, *_: Any) -> None:
-        self._set(trainer)
+    def on_train_batch_end(self, *_: Any) -> None:
+        self._set()
 
-    def _set(self, trainer: Trainer) -> None:
-        factor = self._run.schedule.factor(
-            steps=self._run.stream.counters.iteration, used=self._run.budget_used
-        )
-        for group, rate in zip(_groups(trainer), self._rates, strict=True):
-            group["lr"] = rate * factor
-
-
-def _groups(trainer: Trainer) -> list[dict[str, Any]]:
-    (optimizer,) = trainer.optimizers
-    return optimizer.param_groups
+    def _set(self) -> None:
+        steps = self._run.stream.counters.iteration
+        self._base.scale(self._run.schedule.factor(steps=steps, used=self._run.budget_used))

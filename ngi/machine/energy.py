@@ -1,9 +1,12 @@
 """Energy that processors and GPU have used, from the counters that hardware keeps of it."""
 
 import ctypes
+import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+log = logging.getLogger(__name__)
 
 POWERCAP = Path("/sys/class/powercap")
 """Where Linux shows Intel's and AMD's RAPL counters; on most systems for root only."""
@@ -23,12 +26,14 @@ class EnergyCounter:
 class EnergyMeter:
     """Joules between each `start` and `stop`, over all counters; None where there is no counter.
 
+    Where a counter can no longer be read, as after a driver has been changed, that is logged, and
+    the energy is unknown from then on: a run goes on without.
     What a counter counts, it counts for the whole processor or GPU, whoever uses it. Between two
     readings a counter may wrap around once; a server's takes a quarter of an hour or more for that.
     """
 
     def __init__(self, counters: Sequence[EnergyCounter]) -> None:
-        self._counters = counters
+        self._counters = list(counters)
         self._since: list[float] | None = None
         self._joules: float | None = 0.0 if counters else None
 
@@ -52,9 +57,9 @@ class EnergyMeter:
     def stop(self) -> None:
         """Counts what has been used since `start`, if it was called."""
         since, self._since = self._since, None
-        if since is None or self._joules is None:
+        if since is None or (read := self._read()) is None or self._joules is None:
             return
-        for counter, before, now in zip(self._counters, since, self._read(), strict=True):
+        for counter, before, now in zip(self._counters, since, read, strict=True):
             wrapped = counter.wraps_at if now < before and counter.wraps_at is not None else 0.0
             self._joules += now - before + wrapped
 
@@ -62,8 +67,13 @@ class EnergyMeter:
         """Goes on from an earlier process's `joules`; unknown energy stays unknown."""
         self._joules = None if self._joules is None else joules
 
-    def _read(self) -> list[float]:
-        return [counter.read() for counter in self._counters]
+    def _read(self) -> list[float] | None:
+        try:
+            return [counter.read() for counter in self._counters]
+        except OSError as error:
+            log.warning("energy is unknown from here on: %s", error)
+            self._counters, self._joules = [], None
+            return None
 
 
 def energy_counters() -> list[EnergyCounter]:

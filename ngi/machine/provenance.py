@@ -3,6 +3,7 @@
 import hashlib
 import platform
 import subprocess
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -45,8 +46,12 @@ def _versions() -> dict[str, str | None]:
     return found
 
 
+@cache
 def code_commit() -> tuple[str | None, bool]:
-    """The commit of this code and whether it was changed since; (None, False) outside git."""
+    """The commit of this code and whether it was changed since; (None, False) outside git.
+
+    As it is when it is first asked for: a process loads its modules once.
+    """
     folder = Path(__file__).resolve().parent
 
     def git(*arguments: str) -> str:

@@ -32,21 +32,17 @@ class ViewOptions:
 
 def view(options: ViewOptions) -> None:
     """Serves the page until Ctrl-C."""
-    from ngi.view.page import ErrorPage, Page
+    try:
+        from ngi.view.page import Page
+    except ModuleNotFoundError as error:
+        raise RuntimeError(f"ngi view needs {error.name}: pip install -e .[viewer]") from error
     from ngi.view.studio import Studio
     from ngi.view.subject import subject
     from ngi.view.trained_run import TrainedRun
 
     if options.resolution < 1:
         raise ValueError(f"resolution: {options.resolution}: give at least 1")
-    try:
-        run = TrainedRun.open(Path(options.run), scene_path=options.scene)
-    except (ValueError, OSError, RuntimeError) as error:
-        print(error, file=sys.stderr)
-        with closing(ErrorPage(str(error), host=options.host, port=options.port)) as page:
-            print(f"{page.address} says so too; end with Ctrl-C")
-            page.wait()
-        return
+    run = TrainedRun.open(Path(options.run), scene_path=options.scene)
     studio = Studio(renderer=run.renderer, predict=run.predict)
     shown = subject(
         name=f"{run.scene_name}, step {run.step:,}",

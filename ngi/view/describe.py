@@ -93,7 +93,7 @@ class DescribeOptions:
     """
 
     scene: str = option(
-        "a scene's name or folder, a Mitsuba XML file, or a folder with the authors' tagged one"
+        "a scene's name or folder, a Mitsuba XML file, or a folder with a scene.xml"
     )
     backend: str = option("auto, cuda, llvm or scalar", "auto")
 
@@ -102,12 +102,13 @@ def describe(options: DescribeOptions) -> int:
     """Prints the description; 1 where something is wrong with the scene."""
     activate(options.backend)
     path = Path(options.scene)
+    document = path / "scene.xml" if path.is_dir() else path
     if (arguments := scenes().get(options.scene)) is not None:
         description = read_scene(**arguments)
     elif (path / "scene.yaml").is_file():
         description = read_scene(path)
-    elif path.is_file() and path.suffix == ".xml" and "var_" not in path.read_text():
-        print(describe_file(path))
+    elif document.is_file() and document.suffix == ".xml" and "var_" not in document.read_text():
+        print(describe_file(document))
         return 0
     elif not path.exists():
         raise FileNotFoundError(

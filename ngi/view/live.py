@@ -50,7 +50,7 @@ class LiveView(Callback):
         self._run = run
         self._page = page
         self._studio = studio
-        self._panel = TrainingPanel(page.gui, [*variables, "patch x", "patch y"])
+        self._panel = TrainingPanel(page.gui, axes(variables))
         self._visited: deque[tuple[Tensor, Tensor]] = deque(maxlen=KEPT_BATCHES)
         self._free_from = self._refresh_from = 0.0
         self._closed = False
@@ -100,7 +100,7 @@ class LiveView(Callback):
             visited=Visited(
                 torch.cat([empty, *states]), torch.cat([torch.empty(0), *densities]), current
             ),
-            patches=self._run.samples.example(store.get(ids))[1],
+            patches=first_images(self._run.samples.example(store.get(ids))[1]),
             losses=losses.tolist(),
         )
 
@@ -139,8 +139,9 @@ def live_view(
 class TrainingPanel:
     """A folder of the page that all browsers share."""
 
-    def __init__(self, gui: viser.GuiApi, components: Sequence[str]) -> None:
-        self._axes = {name: Axis(name, index) for index, name in enumerate(components)}
+    def __init__(self, gui: viser.GuiApi, axes: Sequence[Axis]) -> None:
+        self._axes = {axis.name: axis for axis in axes}
+        components = list(self._axes)
         with gui.add_folder("Training", order=FIRST):
             self._across = gui.add_dropdown("chains, across", components)
             self._up = gui.add_dropdown("chains, up", components, initial_value=components[1])
@@ -151,6 +152,17 @@ class TrainingPanel:
         self._image.image = training_figure(
             across=self._axes[self._across.value], up=self._axes[self._up.value], **what
         )
+
+
+def axes(variables: Sequence[str]) -> list[Axis]:
+    """The components of v, and the patch position, which is at the end of every method's states."""
+    patch = [Axis("patch x", -2), Axis("patch y", -1)]
+    return [*(Axis(name, index) for index, name in enumerate(variables)), *patch]
+
+
+def first_images(radiance: Tensor) -> Tensor:
+    """[n, P, P, 3], the first image of each of [n, …, P, P, 3], which is that of its v."""
+    return radiance.flatten(1, -4)[:, 0] if radiance.ndim > 4 else radiance
 
 
 def _rows(path: Path) -> pd.DataFrame:

@@ -1,8 +1,6 @@
 """The web server whose page shows a network, to any number of browsers and to no other page."""
 
 import logging
-import re
-import time
 import warnings
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager
@@ -47,13 +45,6 @@ def is_own_page(origin: str | None, name: str | None, *, host: str) -> bool:
     if name is None or urlsplit(origin).netloc != name:
         return False
     return host not in LOOPBACK or urlsplit(f"//{name}").hostname in LOOPBACK
-
-
-def fenced(text: str) -> str:
-    """Markdown that shows any text as it is: its fence is longer than every run of backticks."""
-    longest = max(map(len, re.findall("`+", text)), default=0)
-    fence = "`" * max(3, longest + 1)
-    return f"{fence}\n{text}\n{fence}"
 
 
 @contextmanager
@@ -117,20 +108,3 @@ class Page:
     def _welcome(self, client: viser.ClientHandle) -> None:
         visitor = Visitor(client, self._subject, self._studio, resolution=self._resolution)
         self._studio.open(client.client_id, visitor.wish, visitor.show)
-
-
-class ErrorPage:
-    """Says why there is nothing to see."""
-
-    def __init__(self, message: str, *, host: str, port: int) -> None:
-        self._server = viser_server(host=host, port=port)
-        self._server.gui.add_markdown(f"**This run cannot be shown.**\n\n{fenced(message)}")
-        self.address = f"http://{host}:{self._server.get_port()}"
-
-    def wait(self) -> None:
-        """Until the program is ended."""
-        while True:
-            time.sleep(1)
-
-    def close(self) -> None:
-        self._server.stop()

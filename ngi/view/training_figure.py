@@ -37,7 +37,7 @@ class Visited:
 
 @dataclass(frozen=True)
 class Axis:
-    """A component of a state, and what it is called."""
+    """A component of a state, from its end where negative, and what it is called."""
 
     name: str
     component: int

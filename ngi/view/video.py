@@ -38,7 +38,7 @@ class VideoOptions:
         "camera",
     )
     hard_frame: int = option("of path=static: which one", 0)
-    beside: list[str] | None = option("folders of other runs of the scene, [FOLDER,FOLDER]", None)
+    beside: list[str] | None = option("folder of another run of the scene; may be repeated", None)
     reference: int = option("samples per pixel, an even number, of path-traced frames beside it", 0)
     seconds: float = option("how long", 8.0)
     frames_per_second: int = option("of the video", 24)

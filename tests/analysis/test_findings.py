@@ -136,6 +136,7 @@ def test_distances_have_to_fall_by_more_than_uniforms(make_method, tmp_path, mon
 
     monkeypatch.setattr(findings, "histogram_distances", distances)
     own, own_beyond, other, other_beyond = histogram_follows_target(find_runs(tmp_path)[0])
+    assert "active_exploration" in own.text
     assert own.value == pytest.approx(-0.3, abs=0.01)
     assert own_beyond.value == pytest.approx(-0.2, abs=0.01)
     assert (own.verdict, own_beyond.verdict) == (Verdict.REPRODUCED, Verdict.REPRODUCED)
@@ -177,3 +178,22 @@ def test_maps_of_methods_run_in_several_ways_are_not_mixed(
     monkeypatch.setattr(findings, "histogram_distances", distances)
     assert histogram_follows_target(find_runs(tmp_path)[0]) == []
     assert sorted(seen) == [("active_exploration", 0), ("uniform", 0)]
+
+
+def test_without_the_methods_own_runs_no_other_test_decides(
+    make_method, tmp_path, monkeypatch
+) -> None:
+    for method in ("metropolis", "uniform"):
+        make_method(method, scene="mirror", reuse="never")
+    rows = [
+        {"method": method, "seed": seed, "run_seconds": seconds, "distance": end + seed / 1000}
+        for method, end in (("metropolis", 0.1), ("uniform", 0.5))
+        for seed in range(3)
+        for seconds, end in ((10.0, 0.5), (90.0, end))
+    ]
+    monkeypatch.setattr(findings, "histogram_distances", lambda _: pd.DataFrame(rows))
+    own, own_beyond, other, _ = histogram_follows_target(find_runs(tmp_path)[0])
+    assert "active_exploration" in own.text
+    assert math.isnan(own.value)
+    assert own.verdict is own_beyond.verdict is Verdict.INCONCLUSIVE
+    assert other.value == pytest.approx(-0.4)

@@ -210,6 +210,13 @@ def test_a_folder_with_other_settings_is_named(tmp_path: Path) -> None:
     status, output = sweep(tmp_path, "seed=0", options=("-m", "--dry-run"))
     assert status == 1, output
     assert "settings.json is no run's" in output
+    (folder / "settings.json").write_text("{")
+    _, output = sweep(tmp_path, "seed=0", options=("-m", "--dry-run"))
+    assert "settings.json is damaged" in output
+    (folder / "settings.json").unlink()  # as a run then goes on
+    status, output = sweep(tmp_path, "seed=0", options=("-m", "--dry-run"))
+    assert status == 0, output
+    assert rows(output)["0.001-0"][:2] == ["interrupted", "0%"]
 
 
 def planned(state: str, left: float | None) -> Planned:

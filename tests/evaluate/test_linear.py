@@ -181,6 +181,7 @@ def test_a_changed_number_is_found(run: Path, capsys) -> None:
         ("gone", "hard_02_prediction.exr cannot be read"),
         ("size", "hard_02_prediction.exr and its reference are of 8 x 8 and 33 x 33 pixels"),
         ("protocol", "which this program knows as"),
+        ("damaged", "result.json is damaged: Expecting value"),
         ("folder", "holds no finished run"),
     ],
 )
@@ -192,6 +193,8 @@ def test_what_cannot_be_checked_is_said(run: Path, problem: str, message: str, c
         file.unlink()
     elif problem == "size":
         write_exr(file, torch.zeros(8, 8, 3))
+    elif problem == "damaged":
+        (run / "result.json").write_text("")
     elif problem == "protocol":
         change(run, lambda content: content["protocol"].update(identity="0123"))
     else:

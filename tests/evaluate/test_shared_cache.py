@@ -2,17 +2,15 @@
 
 import logging
 import multiprocessing
-import os
-import sys
 from multiprocessing import Barrier
 from pathlib import Path
-from unittest import mock
 
 import pytest
 import torch
 
 from ngi.evaluate import EvaluationProtocol, ReferenceCache
 from ngi.render import AnalyticRenderer
+from tests import warm
 
 V = torch.tensor([0.25, 0.5, 0.75])
 PROCESSES, FRAMES = 2, 20
@@ -43,13 +41,11 @@ def render_all(
 
 
 def test_two_processes_share_a_cache(tmp_path: Path) -> None:
-    context = multiprocessing.get_context("spawn")
-    barrier, hashes = context.Barrier(PROCESSES), context.Queue()
+    barrier, hashes = warm.CONTEXT.Barrier(PROCESSES), warm.CONTEXT.Queue()
     arguments = (tmp_path / "shared", barrier, hashes)
-    with mock.patch.dict(os.environ, PYTHONPATH=os.pathsep.join(sys.path), OMP_NUM_THREADS="1"):
-        processes = [context.Process(target=render_all, args=arguments) for _ in range(PROCESSES)]
-        for process in processes:
-            process.start()
+    processes = [warm.process(render_all, *arguments) for _ in range(PROCESSES)]
+    for process in processes:
+        process.start()
     found = [hashes.get(timeout=100) for _ in processes]
     for process in processes:
         process.join()

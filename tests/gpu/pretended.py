@@ -8,10 +8,13 @@ CUDA would raise, and every time that the host waits for the device is written d
 
 from __future__ import annotations
 
-import traceback
+import os
+import sys
 from collections import Counter
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
 import torch
@@ -23,7 +26,8 @@ import ngi
 
 DEVICE = torch.device("cuda", 0)
 CPU = torch.device("cpu")
-PROGRAM = Path(ngi.__file__).parent
+BEGINNING = f"{Path(ngi.__file__).parent}{os.sep}"
+"""Of the names of the program's files."""
 aten = torch.ops.aten
 
 MIXED = {aten.copy_, aten._foreach_copy_}
@@ -126,12 +130,16 @@ TAPE: list[list[Any]] = []
 
 def caller() -> str:
     """The innermost line of the program under way, as 'learn/step.py:123'."""
-    for frame in reversed(traceback.extract_stack()):
-        if frame.filename.startswith(str(PROGRAM)):
-            return f"{Path(frame.filename).relative_to(PROGRAM)}:{frame.lineno}"
+    frame: FrameType | None = sys._getframe()
+    while frame is not None:
+        file = frame.f_code.co_filename
+        if file.startswith(BEGINNING):
+            return f"{file.removeprefix(BEGINNING)}:{frame.f_lineno}"
+        frame = frame.f_back
     return "outside"
 
 
+@cache
 def is_view(operator: Any) -> bool:
     return any(
         argument.alias_info is not None and not argument.alias_info.is_write
@@ -159,6 +167,7 @@ def check_devices(operator: Any, args: Any, kwargs: Any) -> None:
         raise RuntimeError(f"{operator} was to write what is on cuda:0 into a tensor on cpu")
 
 
+@cache
 def _writes(operator: Any) -> bool:
     arguments = operator._schema.arguments
     return bool(arguments and arguments[0].alias_info and arguments[0].alias_info.is_write)

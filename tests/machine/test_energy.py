@@ -68,3 +68,20 @@ def test_parts_of_a_resumed_run_add_up_and_the_unknown_stays_unknown() -> None:
     nothing = EnergyMeter([])
     nothing.load(7.0)
     assert nothing.joules is None
+
+
+def test_a_counter_that_is_gone_makes_energy_unknown_and_ends_nothing(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    file = zone(tmp_path, "0", "package-0", 100)
+    meter = EnergyMeter(processor_counters(tmp_path))
+    meter.start()
+    file.unlink()  # as where a driver is changed meanwhile
+    meter.stop()
+    assert meter.joules is None
+    assert str(file) in caplog.text
+    caplog.clear()
+    meter.start()
+    meter.stop()
+    assert meter.joules is None
+    assert not caplog.text

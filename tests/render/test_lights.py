@@ -33,17 +33,21 @@ CONE = "{object: light, property: cone, minimum: [15, 5], maximum: [35, 15]}"
 FOV = "{object: camera, property: fov, minimum: 10, maximum: 50}"
 
 
+def write(folder, light, *variables) -> None:
+    write_scene(folder, shapes=WALL + light, variables=(), max_depth=2)
+    text = (folder / "scene.yaml").read_text()
+    lines = [line for line in text.splitlines() if "camera_path" not in line]
+    lines[-1] = f"variables: [{', '.join(variables)}]}}"
+    (folder / "scene.yaml").write_text("\n".join(lines))
+
+
 @pytest.fixture(params=["llvm", "scalar"])
 def load(request, tmp_path):
     if request.param == "llvm" and (problem := llvm_problem()) is not None:
         pytest.skip(problem)
 
     def load(light, *variables, **arguments):
-        write_scene(tmp_path, shapes=WALL + light, variables=(), max_depth=2)
-        text = (tmp_path / "scene.yaml").read_text()
-        lines = [line for line in text.splitlines() if "camera_path" not in line]
-        lines[-1] = f"variables: [{', '.join(variables)}]}}"
-        (tmp_path / "scene.yaml").write_text("\n".join(lines))
+        write(tmp_path, light, *variables)
         return MitsubaRenderer(
             scene=read_scene(tmp_path), backend=request.param, patch_size=4, **arguments
         )
@@ -120,8 +124,8 @@ def test_the_renderer_tells_where_a_light_without_a_surface_is(load, light) -> N
         np.testing.assert_allclose((2 * np.array(position) - 1) * SIZE, place, atol=1e-5)
 
 
-def test_no_other_variant_of_mitsuba_has_to_be_loaded_first(load, tmp_path) -> None:
-    load(POINT, MOVES)
+def test_no_other_variant_of_mitsuba_has_to_be_loaded_first(tmp_path) -> None:
+    write(tmp_path, POINT, MOVES)
     program = (
         "from ngi.render.mitsuba_renderer import MitsubaRenderer as R; "
         "from ngi.scene import read_scene; "
@@ -138,8 +142,8 @@ def test_what_moves_a_light_changes_no_buffer(load) -> None:
     assert not load(POINT, FOV)._static
 
 
-def test_a_camera_with_a_lens_is_refused(load, tmp_path) -> None:
-    load(POINT, MOVES)
+def test_a_camera_with_a_lens_is_refused(tmp_path) -> None:
+    write(tmp_path, POINT, MOVES)
     text = (tmp_path / "scene.xml").read_text()
     lens = '"thinlens"><float name="aperture_radius" value="0.1"/>'
     lens += '<float name="focus_distance" value="4"/>'

@@ -252,15 +252,3 @@ def test_a_lost_connection_comes_back(trained: Path, browser: playwright.Browser
             except playwright.TimeoutError:
                 continue  # not connected yet
         pytest.fail("the page has not connected again")
-
-
-def test_a_bad_checkpoint_is_said_on_the_page(
-    trained: Path, tmp_path: Path, browser: playwright.Browser
-) -> None:
-    shutil.copytree(trained / "run", tmp_path / "bad")
-    for checkpoint in (tmp_path / "bad").glob("*.ckpt"):
-        checkpoint.write_bytes(checkpoint.read_bytes()[:-100])
-    with viewer(tmp_path, free_port(), "bad") as address:
-        page = browser.new_page()
-        page.goto(address, timeout=PATIENCE)
-        page.get_by_text("is damaged").first.wait_for(timeout=PATIENCE)

@@ -143,10 +143,11 @@ def test_geometry_out_of_bounds_is_noted(room, capsys) -> None:
     assert text.count("note:") == 1
 
 
-def test_a_plain_file_becomes_a_variable_scene(room, capsys) -> None:
+@pytest.mark.parametrize("given", ["scene.xml", "."])
+def test_a_plain_file_becomes_a_variable_scene(room, given, capsys) -> None:
     folder = room(FREE)
     (folder / "scene.yaml").unlink()
-    assert main([str(folder / "scene.xml"), "backend=scalar"]) == 0
+    assert main([str(folder / given), "backend=scalar"]) == 0
     text = capsys.readouterr().out
     assert "camera: look_at" in text
     assert "paint: albedo" in text

@@ -12,10 +12,18 @@ import pytest
 import torch
 
 from ngi.learn import PhaseClock
+from ngi.train import train
 from ngi.view import live
-from ngi.view.live import LiveView
+from ngi.view.live import LiveView, axes
+from ngi.view.page import Page
 from ngi.view.training_figure import Axis, Visited, training_figure
 from tests.learn.command_line import run
+from tests.learn.composition import run_config
+from tests.learn.lightning_warnings import IGNORED
+from tests.methods.anf import test_runs as anf
+from tests.methods.cnsr import test_runs as cnsr
+
+pytestmark = IGNORED
 
 
 def figure(**changed: Any) -> np.ndarray:
@@ -85,6 +93,27 @@ def test_a_run_with_a_page_trains_as_one_without(tmp_path: Path) -> None:
         assert torch.equal(weights, checkpoints[1]["state_dict"][name]), name
     # who looks on is no part of a run's identity
     assert checkpoints[0]["run_identity"] == checkpoints[1]["run_identity"]
+
+
+@pytest.mark.parametrize("options", [anf.SHORT, cnsr.RUN], ids=["anf", "cnsr"])
+def test_the_page_shows_runs_whose_samples_are_several_images(
+    options: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shown: list[dict[str, Any]] = []
+
+    def seen(**what: Any) -> np.ndarray:
+        shown.append(what)
+        return training_figure(**what)
+
+    monkeypatch.setattr(Page, "visitors", 1)
+    monkeypatch.setattr(live, "training_figure", seen)
+    page = ("viewer=true", "run.viewer_port=0", "budget.steps=3")
+    train(run_config(*options, *page, f"run.folder={tmp_path / 'run'}"))
+    assert shown
+    assert shown[-1]["patches"].shape[1:] == (16, 16, 3)
+    states = torch.arange(12.0)[None]
+    places = {axis.name: float(states[0, axis.component]) for axis in axes(["x", "y"])}
+    assert places == {"x": 0, "y": 1, "patch x": 10, "patch y": 11}
 
 
 class Recorded:

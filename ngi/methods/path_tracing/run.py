@@ -12,7 +12,7 @@ from omegaconf import DictConfig
 from torch import Tensor
 
 from ngi.clock.phase_clock import PAUSES, PHASES
-from ngi.config.build import build_network, build_samples, plain
+from ngi.config.build import build_network, build_samples, plain, training_device
 from ngi.config.configuration import scene_place
 from ngi.files.code_versions import record_code_version
 from ngi.machine.provenance import provenance
@@ -117,7 +117,7 @@ class _Frames:
         self._times = FrameTimes(list(renderer.hard_frames()))
         samples = build_samples(config, renderer=renderer)
         network = build_network(config, samples=samples).eval()
-        network = network.to("cuda" if torch.cuda.is_available() else "cpu")
+        network = network.to(training_device(config))
         reduced = config.trainer.precision == "bf16-mixed"
         precision = torch.bfloat16 if reduced else torch.float32
         self._buffers: Frame = partial(renderer.image_buffers, resolution=resolution)

@@ -1,13 +1,19 @@
 """Variables of the camera, and of where the sun stands."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
-from typing import Any, Self
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from ngi.scene import transforms
 from ngi.scene.variable import LoadedScene, RangedVariable, Values, Variable, Write
 from ngi.scene.yaml_keys import Vector, YamlKeys
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 VIEW = ("origin_x", "origin_y", "origin_z", "target_x", "target_y", "target_z")
 UP = (0.0, 1.0, 0.0)
@@ -63,11 +69,14 @@ class CameraPath(Variable):
 
     def value(self, components: Values) -> Values:
         """[6]: the view there."""
+        view: Values = self._spline(components[0])
+        return view
+
+    @cached_property
+    def _spline(self) -> CubicSpline:
         from scipy.interpolate import CubicSpline  # a quarter of a second, for few scenes
 
-        places = np.linspace(0, 1, len(self.keys))
-        view: Values = CubicSpline(places, np.array(self.keys))(components[0])
-        return view
+        return CubicSpline(np.linspace(0, 1, len(self.keys)), np.array(self.keys))
 
     def bind(self, scene: LoadedScene) -> Write:
         return _looking(scene, self.objects[0], self.up)

@@ -50,7 +50,7 @@ class Training:
         if isinstance(self._module.trainer, GraphTrainer):
             self._module.record()
         self._optimizer = self._module.configure_optimizers()
-        self._rates = [group["lr"] for group in self._optimizer.param_groups]
+        self._rates = learn.BaseRates(self._optimizer)
         self._samples = samples
         self.predict = self._module.predict
 
@@ -90,9 +90,8 @@ class Training:
         return answer.float().cpu()
 
     def _step(self, batch: Batch) -> None:
-        factor = self._schedule.factor(steps=self._taken, used=self._taken / self.steps)
-        for group, rate in zip(self._optimizer.param_groups, self._rates, strict=True):
-            group["lr"] = rate * factor
+        used = self._taken / self.steps
+        self._rates.scale(self._schedule.factor(steps=self._taken, used=used))
         learn.training_step(
             batch,
             self._module.learner,

@@ -89,13 +89,11 @@ def train(
     optimizer = module.configure_optimizers()
     network = module.network if module.averaged is None else module.averaged.module
     schedule = instantiate(config.schedule)
-    rates = [group["lr"] for group in optimizer.param_groups]
+    rates = learn.BaseRates(optimizer)
     lit = 0.0
     for step, batch in enumerate(islice(stream, plan.steps), start=1):
         lit += renderer.weights(batch.patches.scene_vector).sum(dim=1).mean().item()
-        factor = schedule.factor(steps=step - 1, used=(step - 1) / plan.steps)
-        for group, rate in zip(optimizer.param_groups, rates, strict=True):
-            group["lr"] = rate * factor
+        rates.scale(schedule.factor(steps=step - 1, used=(step - 1) / plan.steps))
         learn.training_step(batch, module.learner, optimizer=optimizer)
         if step % (plan.steps // plan.evaluations) == 0:
             counters = stream.counters

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
 import torch
@@ -72,8 +73,9 @@ def run(folder: Path, overrides: Sequence[str], *, seconds: float) -> dict[str, 
 def learning(method: str, folder: Path, seconds: float) -> Outcome:
     """A method's short run on the processor, and where there is a GPU three times there.
 
-    The third time as CUDA graphs.
+    The third time as CUDA graphs. seconds: for all of them
     """
+    end = monotonic() + seconds
     overrides = (
         *(*FORMULAS, f"method={method}", *METHODS[method]),
         *("model.hidden_features=32", "model.hidden_layers=2"),
@@ -88,7 +90,7 @@ def learning(method: str, folder: Path, seconds: float) -> Outcome:
     errors, weights = {}, {}
     for name, way in ways.items():
         place = folder / method / name
-        result = run(place, (*overrides, *way), seconds=seconds)
+        result = run(place, (*overrides, *way), seconds=end - monotonic())
         errors[name] = result["metrics"]["hard"]["mape"]["mean"]
         weights[name] = read_checkpoint(place / "last.ckpt")["state_dict"]
     apart = 100 * abs(errors["gpu"] / errors["cpu"] - 1)

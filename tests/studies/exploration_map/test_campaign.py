@@ -1,8 +1,6 @@
 import json
-import signal
-import subprocess
-import sys
 from dataclasses import replace
+from multiprocessing import resource_tracker
 from pathlib import Path
 
 import pandas as pd
@@ -10,8 +8,9 @@ import pytest
 
 from ngi.studies.exploration_map import campaign
 from ngi.studies.exploration_map.__main__ import main
-from ngi.studies.exploration_map.plan import BASE, Plan
+from ngi.studies.exploration_map.plan import BASE, PLANS, Plan
 from ngi.studies.exploration_map.setting import METHODS, Method
+from tests import warm
 from tests.waiting import wait_for
 
 PLAN = Plan(settings=(BASE, replace(BASE, volume=0.1)), steps=4, evaluations=2, frames=20)
@@ -119,15 +118,23 @@ def test_provenance_holds_what_a_run_is_built_from(
     assert found["configuration"]["loss_greedy-reuse"]["reuse"]["policy"]["beta"] == 2.0
 
 
+def run_many(folder: Path) -> None:
+    """More runs than anybody waits for, in two further processes."""
+    warm.begin(folder / "output")
+    tracker = resource_tracker._resource_tracker  # an own one frees what the pool leaves behind
+    tracker._fd = tracker._pid = None
+    few = replace(PLANS["smoke"], methods=METHODS[:2])
+    campaign.run_all(few, seeds=range(100), folder=folder, jobs=2)
+
+
 def test_no_process_is_left_where_the_first_one_is_killed(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "ngi.studies.exploration_map", "--settings", "smoke"]
-    command += ["--seeds", "0", "--jobs", "2", "--output", str(tmp_path)]
-    process = subprocess.Popen(command, stderr=subprocess.DEVNULL)
+    process = warm.process(run_many, tmp_path)
+    process.start()
     wait_for(lambda: any(tmp_path.glob("runs/*/*.csv")), seconds=120)
     children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
     assert len(children) >= 2
-    process.send_signal(signal.SIGKILL)
-    process.wait()
+    process.kill()
+    process.join()
     wait_for(lambda: not any(map(runs, children)), seconds=120)
 
 

@@ -13,6 +13,7 @@ import torch
 from ngi.machine.provenance import provenance
 from ngi.studies.benchmark.figures import figure
 from ngi.studies.benchmark.scenes import one_per_folder
+from ngi.studies.gpu_check import runs
 from ngi.studies.gpu_check.__main__ import check, work
 from ngi.studies.gpu_check.item import CutOffError, Item, Outcome
 from ngi.studies.gpu_check.pixels import differences
@@ -153,6 +154,26 @@ def short_run(folder: Path, overrides: Sequence[str], *, seconds: float) -> dict
     assert status == 0, output
     result: dict[str, Any] = json.loads((folder / "result.json").read_text())
     return result
+
+
+def test_a_methods_runs_share_the_seconds_that_are_left(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now, given = [100.0], []
+
+    def cut_off_third(*_: Any, seconds: float) -> dict[str, Any]:
+        given.append(seconds)
+        now[0] += 40
+        if len(given) == 3:
+            raise CutOffError("run goes on next time")
+        return {"metrics": {"hard": {"mape": {"mean": 1.0}}}}
+
+    monkeypatch.setattr(runs, "monotonic", lambda: now[0])
+    monkeypatch.setattr(runs, "run", cut_off_third)
+    monkeypatch.setattr(runs, "read_checkpoint", lambda _: {"state_dict": {}})
+    with pytest.raises(CutOffError):
+        runs.learning("ours", tmp_path, 90)
+    assert given == [90, 50, 10]
 
 
 def test_the_dry_run_goes_through_everything(
