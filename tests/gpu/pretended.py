@@ -20,9 +20,10 @@ from typing import Any
 import torch
 from torch import Tensor
 from torch.utils._python_dispatch import TorchDispatchMode, return_and_correct_aliasing
-from torch.utils._pytree import tree_leaves, tree_map, tree_map_only
+from torch.utils._pytree import tree_map_only
 
 import ngi
+from tests.gpu.nested import leaves, mapped
 
 DEVICE = torch.device("cuda", 0)
 CPU = torch.device("cpu")
@@ -154,7 +155,7 @@ def check_devices(operator: Any, args: Any, kwargs: Any) -> None:
         return
     if packet in INDEXED and isinstance(args[0], OnGpu):
         args = (args[0], *args[2:])
-    tensors = [t for t in tree_leaves((args, kwargs)) if isinstance(t, Tensor)]
+    tensors = [t for t in leaves((args, kwargs)) if isinstance(t, Tensor)]
     on_gpu = [t for t in tensors if isinstance(t, OnGpu)]
     on_cpu = [t for t in tensors if not isinstance(t, OnGpu | _Zeros) and t.ndim > 0]
     if on_gpu and on_cpu:
@@ -175,11 +176,10 @@ def _writes(operator: Any) -> bool:
 
 def computed(operator: Any, args: Any, kwargs: dict[str, Any]) -> Any:
     """What an operator gives, on the device that it would be on."""
-    leaves = tree_leaves((args, kwargs))
-    on_gpu = any(isinstance(leaf, OnGpu) for leaf in leaves)
+    on_gpu = any(isinstance(leaf, OnGpu) for leaf in leaves((args, kwargs)))
     packet = operator.overloadpacket
     if packet in MIXED:
-        on_gpu = isinstance(tree_leaves(args)[0], OnGpu)
+        on_gpu = isinstance(leaves(args)[0], OnGpu)
         _note_copy(args, waits=not ((args[2:] and args[2]) or kwargs.get("non_blocking")))
     check_devices(operator, args, kwargs)
     in_backward = torch._C._current_graph_task_id() != -1  # where C++ asks for its own device
@@ -190,14 +190,14 @@ def computed(operator: Any, args: Any, kwargs: dict[str, Any]) -> Any:
             _note_move(args[0], on_gpu, waits=not kwargs.get("non_blocking"))
     if on_gpu:
         _note(operator, args)
-    plain_args, plain_kwargs = tree_map(plain, (args, kwargs))
+    plain_args, plain_kwargs = mapped(plain, args), mapped(plain, kwargs)
     result = operator(*plain_args, **plain_kwargs)
     if on_gpu and not is_view(operator):
         for tape in TAPE:
             tape.append((operator, plain_args, plain_kwargs, result))
     if not on_gpu:
         return result.as_subclass(_Zeros) if packet is aten.zeros and in_backward else result
-    result = tree_map_only(Tensor, OnGpu, result)
+    result = OnGpu(result) if type(result) is Tensor else tree_map_only(Tensor, OnGpu, result)
     return return_and_correct_aliasing(operator, args, kwargs, result)
 
 
@@ -216,7 +216,7 @@ def _note(operator: Any, args: Any) -> None:
 
 
 def _note_copy(args: Any, *, waits: bool) -> None:
-    for into, source in zip(tree_leaves(args[0]), tree_leaves(args[1]), strict=True):
+    for into, source in zip(leaves(args[0]), leaves(args[1]), strict=True):
         if isinstance(source, Tensor):
             _note_move(source, on(into), waits=waits)
 
