@@ -164,7 +164,7 @@ def _live_view(config: DictConfig, run: learn.Run) -> LiveView:
 
 @hydra.main(version_base="1.3", config_path=str(root() / "conf"), config_name="train")
 def _main(config: DictConfig) -> None:
-    from ngi.render.sampling_advice import pilot_advice
+    from ngi.render.pilot_advice import pilot_advice
 
     try:
         result = train(config)

@@ -95,8 +95,8 @@ def test_a_reader_that_has_seen_enough_is_told_nothing(
 
 def test_help_by_argparse_that_nobody_reads_says_nothing_either() -> None:
     """It swallows the error itself; unbuffered nothing is left to fail."""
-    assert unread("ngi", "report", "--help", unbuffered=False) == (1, "")
-    assert unread("ngi", "report", "--help", unbuffered=True) == (0, "")
+    assert unread("ngi", "gpu-check", "--help", unbuffered=False) == (1, "")
+    assert unread("ngi", "gpu-check", "--help", unbuffered=True) == (0, "")
 
 
 def test_a_pipe_that_breaks_elsewhere_is_an_error() -> None:
@@ -120,6 +120,20 @@ def test_a_verb_shows_its_own_help(verb: str, capsys: pytest.CaptureFixture[str]
         main([verb, "--help"])
     assert stopped.value.code == 0
     assert f"ngi {verb}" in capsys.readouterr().out.splitlines()[0]
+
+
+def test_help_is_there_before_what_the_work_needs_is_imported() -> None:
+    """In a fifth of a second; not where it lists parts that are measured, or what a report has."""
+    verbs = sorted(VERBS.keys() - {*OF_HYDRA, "benchmark", "report"})
+    program = (
+        "import contextlib, sys; from ngi.cli import main\n"
+        f"for verb in {verbs}:\n"
+        "    with contextlib.suppress(SystemExit): main([verb, '--help'])\n"
+        "    found = {'torch', 'mitsuba', 'matplotlib', 'hydra'} & sys.modules.keys()\n"
+        "    assert not found, (verb, found)"
+    )
+    ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stderr
 
 
 @pytest.mark.parametrize("verb", OF_HYDRA)

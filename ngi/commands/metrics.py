@@ -1,97 +1,12 @@
 """Recomputes runs' metrics from their linear pictures, and compares: `ngi metrics --help`."""
 
-import json
-import math
 import os
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-
-from tabulate import tabulate
-from tqdm import tqdm
 
 from ngi.config.options import option, run_tool
-from ngi.evaluate import METRICS, SETS, EvaluationProtocol, Lpips
-from ngi.evaluate.evaluation import mean, worst_mean
-from ngi.evaluate.linear import read_linear
-from ngi.evaluate.metrics import image_metrics, non_finite_pixels
-
-TOLERANCES = {"float": (1e-6, 1e-9), "half": (1e-2, 1e-3)}
-"""Relative and absolute, by the format of the pictures; LPIPS has those of half floats in any case,
-since its network computes in 32 bits. The other metrics of the same 32-bit pictures are the same
-but for the order in which another machine adds numbers."""
-
-Frames = list[dict[str, Any]]
-"""Of each: 'set', 'index', the metrics and 'non_finite', as in result.json."""
-
-
-def recomputed(run: Path, result: Mapping[str, Any], *, lpips: Lpips) -> Frames:
-    """The metrics of a run's test frames, from its linear pictures; LPIPS where it is available.
-
-    Raises ValueError where the run has no such pictures, where one cannot be read, and where this
-    program measures by another protocol.
-    """
-    if result.get("linear") is None:
-        raise ValueError(
-            f"{run} has no linear pictures: run.linear_megabytes was too small, or the run is of "
-            "before they were kept"
-        )
-    protocol = _protocol(run, result)
-    frames = []
-    for frame in tqdm(result["frames"], desc=run.parent.name, unit="frame", disable=None):
-        prediction, reference = read_linear(run / "linear", frame["set"], frame["index"])
-        frames.append(
-            {
-                "set": frame["set"],
-                "index": frame["index"],
-                "non_finite": non_finite_pixels(prediction),
-                **image_metrics(prediction, reference, protocol=protocol, lpips=lpips),
-            }
-        )
-    return frames
-
-
-def _protocol(run: Path, result: Mapping[str, Any]) -> EvaluationProtocol:
-    settings = result["config"]["evaluation"]["evaluator"]["protocol"]
-    protocol = EvaluationProtocol(**{k: v for k, v in settings.items() if not k.startswith("_")})
-    if protocol.identity != result["protocol"]["identity"]:
-        raise ValueError(
-            f"{run} was measured by protocol {result['protocol']['identity']}, which this program "
-            f"knows as {protocol.identity}; use the version that made it ({result.get('commit')})"
-        )
-    return protocol
-
-
-def differences(result: Mapping[str, Any], frames: Frames) -> Iterator[str]:
-    """What of result.json is not what its linear pictures give, a line each."""
-    for told, found in zip(result["frames"], frames, strict=True):
-        for name in (*METRICS, "non_finite"):
-            if not _same(name, told[name], found[name], result["linear"]):
-                where = f"{told['set']} frame {told['index']}"
-                yield f"{where}: {name} is {told[name]} in result.json, recomputed {found[name]}"
-    for set_name in SETS:
-        for name in METRICS:
-            summary = result["metrics"][set_name][name]
-            values = [f[name] for f in result["frames"] if f["set"] == set_name]
-            if summary is None or None in values:
-                continue
-            for statistic, value in (("mean", mean(values)), ("worst5", worst_mean(values))):
-                if not _same(name, summary[statistic], value, "float"):
-                    yield (
-                        f"{set_name}: {name}'s {statistic} is {summary[statistic]} in result.json, "
-                        f"that of its frames is {value}"
-                    )
-
-
-def _same(name: str, told: float | None, found: float | None, kept: str) -> bool:
-    """True, too, where one of the two was not measured."""
-    if told is None or found is None:
-        return True
-    relative, absolute = TOLERANCES["half" if name == "lpips" else kept]
-    both_nan = math.isnan(told) and math.isnan(found)
-    return both_nan or math.isclose(told, found, rel_tol=relative, abs_tol=absolute)
 
 
 @dataclass
@@ -110,32 +25,14 @@ class MetricsOptions:
     )
 
 
-def _table(result: Mapping[str, Any], frames: Frames) -> str:
-    rows = []
-    for set_name in SETS:
-        for name in METRICS:
-            told = result["metrics"][set_name][name]
-            values = [f[name] for f in frames if f["set"] == set_name]
-            found = None if None in values else mean(values)
-            rows.append([set_name, name, None if told is None else told["mean"], found])
-    headers = ["frames", "metric", "result.json", "recomputed"]
-    table: str = tabulate(rows, headers, floatfmt=".6g", missingval="–")
-    return table
-
-
-def _read(file: Path) -> dict[str, Any]:
-    try:
-        result: dict[str, Any] = json.loads(file.read_text())
-    except ValueError as error:
-        raise ValueError(f"{file} is damaged: {error}") from error
-    return result
-
-
 def check(options: MetricsOptions) -> int:
     """Prints what was found; 0 where all agrees, 1 where not, 2 where a run cannot be checked.
 
     Raises ValueError where there is no run at all, and for weights of LPIPS that are none.
     """
+    from ngi.commands.recomputed import differences, read_result, recomputed, table
+    from ngi.evaluate import Lpips
+
     folder = Path(options.run)
     files = sorted(folder.rglob("result.json"))
     if not files:
@@ -144,13 +41,13 @@ def check(options: MetricsOptions) -> int:
     status = 0
     for file in files:
         try:
-            result = _read(file)
+            result = read_result(file)
             frames = recomputed(file.parent, result, lpips=lpips)
         except ValueError as error:
             print(error, file=sys.stderr)
             status = 2
             continue
-        print(f"\n{file.parent}, {result['linear']} pictures\n{_table(result, frames)}")
+        print(f"\n{file.parent}, {result['linear']} pictures\n{table(result, frames)}")
         found = list(differences(result, frames))
         print("\n".join(found) or "all frames agree")
         status = max(status, int(bool(found)))

@@ -1,6 +1,7 @@
 """Which sampler a variable scene asks for, as far as can be told before anything is rendered."""
 
 from ngi.render.materials import Material
+from ngi.render.pilot_advice import CONCENTRATED, PAGE
 from ngi.scene.kinds import (
     Direction,
     Intensity,
@@ -12,14 +13,6 @@ from ngi.scene.kinds import (
 from ngi.scene.scene_parameters import emits
 from ngi.scene.variable import Variable
 from ngi.scene.variable_scene import VariableScene
-
-PAGE = "docs/guide/sampler.md"
-
-CONCENTRATED = 0.2
-"""Share of the loss on the worst 5 % of a pilot run's patches from which on a choice pays.
-
-The paper's scenes have 0.08 to 0.12, `shutters`, where light gets in at 5 % of all v, 0.19 to 0.26.
-"""
 
 SHINY = 0.1
 """Roughness (alpha) up to which a surface gathers light into caustics."""
@@ -50,17 +43,6 @@ def sampling_advice(scene: VariableScene, materials: list[Material]) -> list[str
             "than any choice of few"
         )
     return [*lines, f"see {PAGE}"]
-
-
-def pilot_advice(worst_share: float) -> str:
-    """One line: what a run says of the sampler for the next one.
-
-    worst_share: of the loss of its new patches, see `ngi.learn.new_losses`
-    """
-    return (
-        f"the worst 5% of the new patches had {worst_share:.0%} of the loss "
-        f"(if drawn uniformly, exploring pays from {CONCENTRATED:.0%} on: {PAGE})"
-    )
 
 
 def _rare(scene: VariableScene, materials: list[Material]) -> list[str]:

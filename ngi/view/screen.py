@@ -10,7 +10,7 @@ from torch import Tensor
 
 from ngi.evaluate import tone_map
 from ngi.evaluate.pictures import eight_bit, error_picture
-from ngi.view.gallery import buffer_picture
+from ngi.view.contact_sheet import buffer_picture
 from ngi.view.scene_view import SceneView
 
 CURVES = ("sRGB", "filmic", "linear")

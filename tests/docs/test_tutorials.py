@@ -41,17 +41,17 @@ def run(command: list[str], *, cwd: Path, env: dict[str, str]) -> None:
 
 
 def follow(text: str, *, cwd: Path, env: dict[str, str]) -> None:
-    """Line by line; training begins in a process that need not import everything first."""
+    """Line by line; `ngi` alone begins in a process that need not import everything first."""
     for line in filter(None, text.splitlines()):
-        training = re.fullmatch(r"(?:PYTHONPATH=(\S+) )?ngi (train .*)", line)
-        if training is None:
+        words = re.fullmatch(r"(?:PYTHONPATH=(\S+) )?ngi ([^|&;<>$]*)", line)
+        if words is None:
             run(["bash", "-e", "-c", line], cwd=cwd, env=env)
             continue
-        path = os.pathsep.join([training[1] or env["PYTHONPATH"], str(ROOT)])
+        path = os.pathsep.join([words[1] or env["PYTHONPATH"], str(ROOT)])
         output = cwd.parent / "output"
         started = start_module(
             "ngi",
-            *shlex.split(training[2], comments=True),
+            *shlex.split(words[2], comments=True),
             folder=cwd,
             environment={**env, "PYTHONPATH": path},
             output=output,

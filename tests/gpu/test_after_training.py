@@ -17,7 +17,7 @@ from ngi.view.session import SETTLED, Wish
 from ngi.view.studio import Shown, Studio
 from ngi.view.trained_run import TrainedRun
 from tests.gpu.machine import pretended_gpu
-from tests.gpu.pretended import CPU, Ledger, on
+from tests.gpu.pretended import CPU, on
 from tests.gpu.test_runs import OURS, assert_close, trained
 from tests.learn.command_line import SMALL
 from tests.learn.comparison import assert_same, final_state
@@ -28,11 +28,13 @@ pytestmark = [*IGNORED, RESUMED]
 RUN = (*SMALL, "run.checkpoint_steps=4")
 
 
-@pytest.fixture
-def finished(gpu: Ledger, tmp_path: Path) -> Path:  # noqa: ARG001
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a run, with averaged weights and patches on the GPU."""
-    trained(tmp_path, *OURS, "budget.steps=6")
-    return tmp_path / "run"
+    folder = tmp_path_factory.mktemp("finished")
+    with pretended_gpu():
+        trained(folder, *OURS, "budget.steps=6")
+    return folder / "run"
 
 
 @pytest.mark.usefixtures("gpu")
@@ -56,6 +58,7 @@ def test_a_run_from_a_gpu_goes_on_without_one(tmp_path: Path) -> None:
     assert_close(tmp_path / "cpu", tmp_path / "longer")
 
 
+@pytest.mark.usefixtures("gpu")
 def test_a_picture_of_it_is_written(finished: Path, tmp_path: Path) -> None:
     for name in ("picture.png", "picture.exr"):
         write_picture(
@@ -64,6 +67,7 @@ def test_a_picture_of_it_is_written(finished: Path, tmp_path: Path) -> None:
         assert (tmp_path / name).stat().st_size > 0
 
 
+@pytest.mark.usefixtures("gpu")
 def test_the_viewer_shows_what_the_network_says(finished: Path) -> None:
     run = TrainedRun.open(finished)
     assert next(run.network.parameters()).is_cuda
@@ -80,6 +84,7 @@ def test_the_viewer_shows_what_the_network_says(finished: Path) -> None:
     assert pictures[-1].pixels.shape == (24, 24, 3)
 
 
+@pytest.mark.usefixtures("gpu")
 def test_it_is_exported_from_the_cpu(
     finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

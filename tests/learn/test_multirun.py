@@ -11,7 +11,7 @@ def test_one_failing_job_does_not_lose_the_others(tmp_path: Path, launcher: str)
     if launcher != "basic":
         plugin = launcher.partition("_")[0]
         pytest.importorskip(f"hydra_plugins.hydra_{plugin}_launcher", reason="an extra is missing")
-    start = run if launcher == "basic" else run_cold  # which has no processes of its own
+    start = run_cold if launcher == "joblib" else run  # whose processes wait for their parent
     status, output = start(
         tmp_path, "optimizer.lr=-1,1e-3", f"hydra/launcher={launcher}", options=("--multirun",)
     )

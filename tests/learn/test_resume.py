@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from ngi.clock.phase_clock import PHASES
-from ngi.render.sampling_advice import pilot_advice
+from ngi.render.pilot_advice import pilot_advice
 from tests.learn.command_line import BRIEF, run, start
 from tests.learn.comparison import assert_same, final_state
 
@@ -44,6 +44,7 @@ def test_real_renders_with_growing_resolution_resume_bit_for_bit(tmp_path: Path)
         "resolution.every=6",
         "run.checkpoint_steps=5",
         "run.folder=run",
+        f"run.references={tmp_path / 'references'}",
     )
     (tmp_path / "a").mkdir()
     (tmp_path / "b").mkdir()

@@ -5,7 +5,8 @@ import pytest
 from ngi.files.resources import root
 from ngi.machine.backend import activate
 from ngi.render.materials import collect_materials
-from ngi.render.sampling_advice import PAGE, pilot_advice, sampling_advice
+from ngi.render.pilot_advice import PAGE, pilot_advice
+from ngi.render.sampling_advice import sampling_advice
 from ngi.scene import read_scene
 from ngi.scene.variable_scene import VariableScene
 

@@ -1,5 +1,6 @@
 """The viewer in a real browser, on a run of closed formulas."""
 
+import contextlib
 import shlex
 import shutil
 import socket
@@ -12,7 +13,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tests.learn.command_line import environment, run, run_module
+from ngi.view.picture import main as render
+from tests.learn.command_line import environment, run
 from tests.warm import start_module
 
 playwright = pytest.importorskip(
@@ -142,8 +144,8 @@ def wait_until_changed(page: playwright.Page, before: np.ndarray) -> np.ndarray:
 
 def rendered(folder: Path, options: list[str]) -> np.ndarray:
     out = folder / "expected.png"
-    status, output = run_module("ngi", "render", *options, f"out={out}", folder=folder)
-    assert status == 0, output
+    with contextlib.chdir(folder):
+        assert render([*options, f"out={out}"]) == 0
     return np.asarray(Image.open(out))
 
 

@@ -242,9 +242,13 @@ def test_the_variables_can_be_set_by_what_it_says(scene: str) -> None:
 
 
 def test_a_file_that_differs_is_not_written(
-    trained: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    trained: Path,
+    exported: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setattr(export, "TOLERANCE", 1e-12)
+    monkeypatch.setattr("ngi.view.network_file.network_file", lambda *_: exported.read_bytes())
     out = trained / "refused.onnx"
     assert export.main([f"run={trained / 'run'}", f"out={out}"]) == 2
     assert "differs from the one of the run by" in capsys.readouterr().err
