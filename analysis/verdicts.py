@@ -7,31 +7,10 @@ from dataclasses import dataclass, replace
 
 from analysis.claims import CLAIMS, Claim, Comparison
 from analysis.effects import compare_on_scene, pool
-from analysis.evidence import (
-    ALL_SCENES,
-    MORE_THAN_MOST_SEEDS,
-    ComparisonResult,
-    Effect,
-    Finding,
-    TimeRatio,
-    Verdict,
-    of_tests,
-)
+from analysis.evidence import ComparisonResult, Finding, Verdict, of_tests
 from analysis.findings import FINDINGS
 from analysis.runs import Run
 from analysis.sentences import in_words
-
-__all__ = [
-    "ALL_SCENES",
-    "MORE_THAN_MOST_SEEDS",
-    "ClaimResult",
-    "ComparisonResult",
-    "Effect",
-    "Finding",
-    "TimeRatio",
-    "Verdict",
-    "judge",
-]
 
 
 @dataclass(frozen=True)

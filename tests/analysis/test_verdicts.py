@@ -6,10 +6,11 @@ import yaml
 
 from analysis.claim_tables import claims_table
 from analysis.claims import CLAIMS, SALONS
+from analysis.evidence import ALL_SCENES, Verdict
 from analysis.findings import FINDINGS
 from analysis.methods import TITLES, name_methods
 from analysis.runs import find_runs
-from analysis.verdicts import ALL_SCENES, ClaimResult, Verdict, judge
+from analysis.verdicts import ClaimResult, judge
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 MAKEFILE = (REPOSITORY / "Makefile").read_text()
