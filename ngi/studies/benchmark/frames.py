@@ -6,11 +6,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from itertools import cycle
+from typing import Self
 
 import torch
 from torch import Tensor, nn
 
+from ngi.config.build import build_network, build_samples, training_device
+from ngi.config.configuration import composed
 from ngi.denoise import OpenImageDenoise
+from ngi.learn import Samples
 from ngi.machine.precision import fast_precision
 from ngi.machine.timing import in_turn
 from ngi.methods.path_tracing.frame_time import show
@@ -18,12 +22,9 @@ from ngi.methods.path_tracing.tracing import PathTracing
 from ngi.render.mitsuba_renderer import MitsubaRenderer
 from ngi.studies.benchmark.figures import Figure, figure, ratio
 from ngi.studies.benchmark.scenes import Scene
-from ngi.studies.benchmark.training import OURS
 
 RESOLUTIONS = (96, 256, 900)
 """That of the test frames of `budget=small`, of the viewer, and of the paper's pictures."""
-FEATURES, LAYERS = 128, 6
-"""Of the network of `budget=small`."""
 SAMPLES_PER_PIXEL = 8
 """Of the paths that are denoised."""
 FEWER_RAYS = 8
@@ -36,31 +37,43 @@ def frames(scene: Scene, *, repeats: int, seconds: float) -> list[Figure]:
     The denoiser is given buffers for nothing: it needs those of the first hit without direct light,
     which take less than ours.
     """
-    renderer, network = ours(scene)
-    made = [
-        _frames(renderer, network, resolution, repeats=repeats, seconds=seconds / len(RESOLUTIONS))
+    made = Ours.of(scene)
+    figures = [
+        _frames(made, resolution, repeats=repeats, seconds=seconds / len(RESOLUTIONS))
         for resolution in RESOLUTIONS
     ]
-    return [figure for figures in made for figure in figures]
+    return [figure for of_one in figures for figure in of_one]
 
 
-def ours(scene: Scene) -> tuple[MitsubaRenderer, nn.Module]:
-    """Renderer and untrained network of `method=ours` and `budget=small`."""
-    renderer = MitsubaRenderer(scene=scene.read(), direct="with_caustics", specular="traced")
-    network = OURS.network(
-        layout=renderer.layout,
-        scene_dimensions=renderer.dimensions,
-        hidden_features=FEATURES,
-        hidden_layers=LAYERS,
-        relative=True,
-        moving=renderer.moving_points,
-    )
-    return renderer, network.to("cuda" if torch.cuda.is_available() else "cpu")
+@dataclass(frozen=True)
+class Ours:
+    """Renderer, samples and untrained network of `method=ours` and `budget=small`.
 
+    size: of the network, as '6x128'
+    """
 
-def precision() -> torch.dtype:
-    """Of the network's products on this machine."""
-    return torch.bfloat16 if fast_precision() == "bf16-mixed" else torch.float32
+    renderer: MitsubaRenderer
+    samples: Samples
+    network: nn.Module
+    size: str
+
+    @classmethod
+    def of(cls, scene: Scene) -> Self:
+        # without the denoiser of its training patches, which is not on every machine
+        config = composed("method=ours", "budget=small", "data=patches_without_camera")
+        renderer = MitsubaRenderer(
+            scene=scene.read(), direct=config.renderer.direct, specular=config.renderer.specular
+        )
+        samples = build_samples(config, renderer=renderer)
+        network = build_network(config, samples=samples).to(training_device(config))
+        size = f"{config.model.hidden_layers}x{config.model.hidden_features}"
+        return cls(renderer, samples, network, size)
+
+    def predict(self, buffers: Tensor, v: Tensor) -> Tensor:
+        """[H, W, 3] radiance, of buffers [H, W, C] and v [D], in this machine's precision."""
+        (seen,) = self.samples.test_inputs(v, resolution=len(buffers))
+        bits = torch.bfloat16 if fast_precision() == "bf16-mixed" else torch.float32
+        return show(self.network, buffers, seen, bits)
 
 
 @dataclass(frozen=True)
@@ -74,14 +87,8 @@ class _Times:
     denoiser: list[float]
 
 
-def _frames(
-    renderer: MitsubaRenderer,
-    network: nn.Module,
-    resolution: int,
-    *,
-    repeats: int,
-    seconds: float,
-) -> list[Figure]:
+def _frames(made: Ours, resolution: int, *, repeats: int, seconds: float) -> list[Figure]:
+    renderer = made.renderer
     tracing = PathTracing(
         renderer=renderer,
         denoiser=OpenImageDenoise(),
@@ -91,7 +98,6 @@ def _frames(
     hard = renderer.hard_frames()
     buffers = renderer.image_buffers(hard[0], resolution=resolution).cpu()
     noisy = tracing.trace(hard[0], resolution=resolution)
-    bits = precision()
 
     def every_v(start: float) -> Iterator[Tensor]:
         """All of them in turn, for one function; others start elsewhere, so that v changes."""
@@ -105,22 +111,25 @@ def _frames(
         lambda: renderer.image_buffers(
             next(for_fewer_rays), resolution=resolution, samples=FEWER_RAYS
         ),
-        lambda: show(network, buffers, next(for_network), bits),
+        lambda: made.predict(buffers, next(for_network)),
         lambda: tracing.trace(next(for_paths), resolution=resolution),
         partial(tracing.denoise, noisy, buffers),
         seconds=seconds,
     )
-    return _figures(_Times(*times), f"{resolution} × {resolution}")
+    return _figures(_Times(*times), f"{resolution} × {resolution}", network=made.size)
 
 
-def _figures(times: _Times, size: str) -> list[Figure]:
-    """Of the parts in milliseconds, and the shares of the denoiser's time. size: in their names."""
+def _figures(times: _Times, size: str, *, network: str) -> list[Figure]:
+    """Of the parts in milliseconds, and the shares of the denoiser's time.
+
+    size, network: in their names
+    """
     ours = _sums(times.buffers, times.network)
     denoised = _sums(times.paths, times.denoiser)
     parts = {
         "buffers with direct light": times.buffers,
         f"the same, {FEWER_RAYS} rays per pixel": times.fewer_rays,
-        f"network {LAYERS}x{FEATURES}": times.network,
+        f"network {network}": times.network,
         "ours": ours,
         f"paths, {SAMPLES_PER_PIXEL} samples per pixel": times.paths,
         "denoiser": times.denoiser,

@@ -8,12 +8,9 @@ from contextlib import contextmanager
 from time import monotonic, sleep
 
 import numpy as np
-from torch import nn
 
-from ngi.methods.path_tracing.frame_time import show
-from ngi.render.mitsuba_renderer import MitsubaRenderer
 from ngi.studies.benchmark.figures import Figure, figure
-from ngi.studies.benchmark.frames import ours, precision
+from ngi.studies.benchmark.frames import Ours
 from ngi.studies.benchmark.scenes import Scene
 from ngi.view.scene_view import Place
 from ngi.view.screen import Screen
@@ -34,23 +31,20 @@ def viewer(scene: Scene, *, seconds: float) -> list[Figure]:
     That is the first that places the camera, if any, and the first of all others: then photons are
     traced anew for each picture. Of the way to the browser nothing is measured.
     """
-    renderer, network = ours(scene)
-    camera = range(renderer.dimensions)[renderer.camera_part]
-    others = [number for number in range(renderer.dimensions) if number not in camera]
+    shown = Ours.of(scene)
+    dimensions = range(shown.renderer.dimensions)
+    camera = dimensions[shown.renderer.camera_part]
+    others = [number for number in dimensions if number not in camera]
     made = []
     for name, moving in (("the camera moves", camera[:1]), ("something else moves", others[:1])):
         for component in moving:
-            made += _while_moving(name, component, renderer, network, seconds=seconds / 2)
+            made += _while_moving(name, component, shown, seconds=seconds / 2)
     return made
 
 
-def _while_moving(
-    name: str, component: int, renderer: MitsubaRenderer, network: nn.Module, *, seconds: float
-) -> list[Figure]:
-    bits = precision()
-    studio = Studio(
-        renderer=renderer, predict=lambda buffers, v: show(network, buffers, v, bits).float()
-    )
+def _while_moving(name: str, component: int, made: Ours, *, seconds: float) -> list[Figure]:
+    renderer = made.renderer
+    studio = Studio(renderer=renderer, predict=lambda *given: made.predict(*given).float())
     first = renderer.hard_frames()[0].tolist()
 
     def wish(moves: int) -> Wish:

@@ -1,4 +1,5 @@
 from itertools import pairwise
+from types import SimpleNamespace
 
 import pytest
 
@@ -62,11 +63,11 @@ def test_the_viewer_shows_pictures_while_a_slider_moves(
     monkeypatch: pytest.MonkeyPatch, camera: slice
 ) -> None:
     def with_camera(scene):
-        renderer, network = frames.ours(scene)
-        renderer.camera_part = camera
-        return renderer, network
+        made = frames.Ours.of(scene)
+        made.renderer.camera_part = camera
+        return made
 
-    monkeypatch.setattr(viewer, "ours", with_camera)
+    monkeypatch.setattr(viewer, "Ours", SimpleNamespace(of=with_camera))
     monkeypatch.setattr(viewer, "RESOLUTION", 64)
     monkeypatch.setattr(viewer, "WARM_UP", 0.5)
     figures = viewer.viewer(MIRROR, seconds=2.0)
@@ -77,3 +78,18 @@ def test_the_viewer_shows_pictures_while_a_slider_moves(
         assert rate.limit == "≥ 10"
         assert pixels.median == 64  # no fewer are ever shown
         assert 3 <= rays.median <= 16
+
+
+@pytest.mark.skipif(llvm_problem() is not None, reason=str(llvm_problem()))
+def test_the_network_is_that_of_a_run() -> None:
+    """Which is not told where the camera is: the buffers say it."""
+    [scene] = shipped(["veach-egg"])
+    made = frames.Ours.of(scene)
+    camera = range(made.renderer.dimensions)[made.renderer.camera_part]
+    assert len(camera) > 0
+    seen = made.renderer.dimensions - len(camera)
+    assert made.samples.network_arguments["scene_dimensions"] == seen
+    v = made.renderer.hard_frames()[0]
+    buffers = made.renderer.image_buffers(v, resolution=16)
+    assert made.predict(buffers, v).shape == (16, 16, 3)
+    assert made.size == "6x128"
