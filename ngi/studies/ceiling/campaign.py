@@ -18,13 +18,13 @@ from ngi.evaluate import Evaluator
 from ngi.files.durable import write_atomically, write_tensors
 from ngi.learn import Samples
 from ngi.machine.memory import keep_freed_memory
-from ngi.machine.provenance import provenance
 from ngi.reuse import CompactPatches
+from ngi.studies import provenance as studies
 from ngi.studies.ceiling.pool import check_count, chosen, render_pool
 from ngi.studies.ceiling.runs import CHUNK, Run, do, measured, plan
 from ngi.studies.ceiling.training import Training
 
-TABLE, PROVENANCE, TEACHER = "ceiling.csv", "provenance.json", "teacher.pt"
+TABLE, TEACHER = "ceiling.csv", "teacher.pt"
 
 TEACHER_SEED = 1000
 """Of the network that stands in for the truth; no run has it."""
@@ -145,11 +145,7 @@ IN_EVERY_RUN = ("pool", "rounds", "teacher_steps")
 
 
 def claim(folder: Path, config: DictConfig, *, scene: str, backend: str) -> None:
-    """Writes the folder's provenance, or compares it with what its runs were made with.
-
-    scene: hash of all its files
-    Raises ValueError where they differ. A choice may be added.
-    """
+    """As `ngi.studies.provenance.claim`; a choice may be added. scene: hash of all its files."""
     study = plain(config.ceiling)
     configuration = {part: plain(config[part]) for part in PARTS}
     for key in NOT_OF_PATCHES:
@@ -161,13 +157,4 @@ def claim(folder: Path, config: DictConfig, *, scene: str, backend: str) -> None
         "protocol": plain(config.evaluation.evaluator.protocol),
         **{f"choice {name}": choice for name, choice in study["choices"].items()},
     }
-    file = folder / PROVENANCE
-    found = json.loads(file.read_text()) if file.exists() else provenance(backend=backend)
-    for key, value in made_with.items():
-        if found.setdefault(key, value) != json.loads(json.dumps(value)):
-            raise ValueError(
-                f"{file}: the runs in this folder were made with another {key} than now; give "
-                "another run.folder, or move the folder away"
-            )
-    folder.mkdir(parents=True, exist_ok=True)
-    write_atomically(file, json.dumps(found, indent=1).encode())
+    studies.claim(folder, made_with, backend=backend, option="run.folder")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import multiprocessing
 from collections.abc import Iterable, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
@@ -17,13 +16,13 @@ from tqdm import tqdm
 from ngi.files.durable import write_atomically
 from ngi.machine.child_process import end_with_parent
 from ngi.machine.memory import keep_freed_memory
-from ngi.machine.provenance import provenance
 from ngi.render import PocketRenderer
 from ngi.studies.exploration_map.plan import BASE, Plan
 from ngi.studies.exploration_map.setting import Method, Setting
 from ngi.studies.exploration_map.training import plain_configuration, train
+from ngi.studies.provenance import claim
 
-TABLE, PROVENANCE = "exploration_map.csv", "provenance.json"
+TABLE = "exploration_map.csv"
 
 
 class Run(NamedTuple):
@@ -94,23 +93,10 @@ def _run_to_file(run: Run, *, plan: Plan, folder: Path) -> None:
 
 
 def _claim(folder: Path, plan: Plan) -> None:
-    """Writes the folder's provenance, or compares it with what its runs were made with."""
-    size = {"steps": plan.steps, "evaluations": plan.evaluations, "frames": plan.frames}
+    """See `ngi.studies.provenance.claim`."""
     made_with = {
-        "size": size,
+        "size": {"steps": plan.steps, "evaluations": plan.evaluations, "frames": plan.frames},
         "scene": PocketRenderer(**BASE.scene, patch_size=1).scene_hash,
         "configuration": {m.name: plain_configuration(m, plan) for m in plan.methods},
     }
-    file = folder / PROVENANCE
-    if file.exists():
-        found = json.loads(file.read_text())
-        for key, value in made_with.items():
-            if found[key] != value:
-                raise ValueError(
-                    f"{file}: the runs in this folder were made with another {key} than now; "
-                    "choose another --output, or move the folder away"
-                )
-        return
-    folder.mkdir(parents=True, exist_ok=True)
-    content = {**provenance(backend=PocketRenderer.description), **made_with}
-    write_atomically(file, json.dumps(content, indent=1).encode())
+    claim(folder, made_with, backend=PocketRenderer.description, option="--output")
