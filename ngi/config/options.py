@@ -23,8 +23,9 @@ def option(text: str, default: Any = MISSING) -> Any:
 def read_options(kind: type[Options], program: str, arguments: Sequence[str]) -> Options:
     """A `kind`, whose fields are made by `option`, from `key=value` arguments.
 
-    A list is `[a,b]`, or its key given once for each item, whatever characters that has. Words
-    without a key are the value of the first field, which takes several if it is a list.
+    A list is `[a,b]`, or its key given once for each item, whatever characters that has; of other
+    values the last one counts. A word without a key is the value of the first field, which takes
+    several if it is a list.
     Ends the program with status 0 where help is asked for, its text being `kind`'s docstring and
     its fields', and with status 2 and a message for an unknown or missing key or a wrong value.
     """
@@ -33,7 +34,7 @@ def read_options(kind: type[Options], program: str, arguments: Sequence[str]) ->
         sys.exit(0)
     entries = {entry.name: str(entry.type) for entry in fields(cast("Any", kind))}
     given: dict[str, list[str]] = {}
-    for word in _with_key(arguments, next(iter(entries), "")):
+    for word in _with_key(arguments, *next(iter(entries.items()), ("", ""))):
         key, equals, text = word.partition("=")
         if key not in entries or not equals:
             known = f"there are {', '.join(sorted(entries))}" if entries else "there are none"
@@ -43,10 +44,8 @@ def read_options(kind: type[Options], program: str, arguments: Sequence[str]) ->
     for key, texts in given.items():
         if entries[key].startswith("list"):
             values[key] = [item for text in texts for item in _items(text)]
-        elif len(texts) == 1:
-            values[key] = texts[0]
         else:
-            _refuse(program, f"'{key}' takes one value, not {' and '.join(texts)}")
+            values[key] = texts[-1]
     try:
         return TypeAdapter(kind).validate_python(values)
     except ValidationError as error:
@@ -54,7 +53,7 @@ def read_options(kind: type[Options], program: str, arguments: Sequence[str]) ->
         key = str(first["loc"][0])
         if key not in given:
             _refuse(program, f"give {key}=…")
-        _refuse(program, f"'{key}={' '.join(given[key])}' is wrong: {first['msg'].lower()}")
+        _refuse(program, f"'{key}={given[key][-1]}' is wrong: {first['msg'].lower()}")
 
 
 def _items(text: str) -> list[str]:
@@ -64,10 +63,11 @@ def _items(text: str) -> list[str]:
     return [item.strip() for item in text[1:-1].split(",")]
 
 
-def _with_key(words: Sequence[str], key: str) -> list[str]:
-    """Words of a command line, those that have none given this key."""
-    named = r"-|\w+=" if key else ""
-    return [word if re.match(named, word) else f"{key}={word}" for word in words]
+def _with_key(words: Sequence[str], key: str, kind: str) -> list[str]:
+    """Words of a command line; this key is given to those without, to one only unless a list's."""
+    bare = [number for number, word in enumerate(words) if not re.match(r"-|\w+=", word)]
+    named = bare if kind.startswith("list") else bare[:1] if key else []
+    return [f"{key}={word}" if number in named else word for number, word in enumerate(words)]
 
 
 def check_output(out: Path, *suffixes: str) -> None:
