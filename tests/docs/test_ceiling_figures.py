@@ -63,17 +63,15 @@ def percent(number: float) -> str:
 
 def test_what_could_be_gained_in_a_quarter_of_an_hour_is_what_the_runs_say() -> None:
     runs = pd.read_csv(ROOT / "docs/exploration-ceiling/quarter_hour.csv")
-    uniform, oracle, everything = (row for _, row in runs.iterrows())
-    assert [*runs["choice"]] == ["uniform", "oracle", "uniform"]
-    assert [*runs["patches"]] == [1792, 1792, 4096]
+    runs = runs.set_index(["patches", "choice", "seed"]).sort_index()
     shown = rows_of("docs/exploration-ceiling/README.md", "A quarter of an hour")[2:5]
     columns = {"error": (1, 4), "tail": (1, 4), "relmse": (0.5, 3)}  # root and decimals
     for row, (column, (power, digits)) in zip(shown, columns.items(), strict=True):
-        names = [f"{frames}_{column}" for frames in ("hard", "uniform")]
-        errors = [uniform[name] ** power for name in names]
-        assert row[0] == " / ".join(f"{error:.{digits}f}" for error in errors)
-        for cell, run in zip(row[1:], (oracle, everything), strict=True):
-            pairs = zip(names, errors, strict=True)
-            changes = [100 * (run[name] ** power / error - 1) for name, error in pairs]
-            text = " / ".join(f"{change:.1f}" for change in changes)
-            assert cell == f"{text} %".replace("-", "−")
+        errors = runs[[f"{frames}_{column}" for frames in ("hard", "uniform")]] ** power
+        base = errors.loc[1792, "uniform"]
+        numbers = [" / ".join(f"{error:.{digits}f}" for error in of_one) for of_one in base.values]
+        assert row[0] == "; ".join(numbers)
+        for cell, run in zip(row[1:], ((1792, "oracle"), (4096, "uniform")), strict=True):
+            changes = 100 * (errors.loc[run] / base).dropna() - 100
+            numbers = [" / ".join(f"{each:.1f}" for each in of_one) for of_one in changes.values]
+            assert cell == f"{'; '.join(numbers)} %".replace("-", "−")
