@@ -82,11 +82,6 @@ class RunFolder:
             ) from error
         return result
 
-    @property
-    def has_something(self) -> bool:
-        """See `has_something`."""
-        return has_something(self.path)
-
     def begin(self, *, scene_place: dict[str, Any] | None = None) -> None:
         """Makes the folder this run's, once everything is built and training can start.
 

@@ -4,7 +4,7 @@ import logging
 
 from ngi.files import code_versions
 from ngi.files.code_versions import same_program, shown
-from ngi.files.run_folder import RunFolder
+from ngi.files.run_folder import RunFolder, has_something
 
 log = logging.getLogger(__name__)
 
@@ -21,7 +21,7 @@ def heed_code_change(folder: RunFolder, *, on_change: str) -> None:
     """
     if on_change not in ON_CHANGE:
         raise ValueError(f"run.on_code_change: '{on_change}'; expected one of {list(ON_CHANGE)}")
-    versions = code_versions.code_versions(folder.path) if folder.has_something else []
+    versions = code_versions.code_versions(folder.path) if has_something(folder.path) else []
     now = code_versions.code_version()
     if not versions or same_program(versions[-1], now):
         return

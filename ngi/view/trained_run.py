@@ -11,6 +11,7 @@ import torch
 from torch import Tensor, nn
 
 from ngi.files.durable import DamagedError
+from ngi.files.run_folder import LAST, PREVIOUS
 from ngi.learn import Samples, network_of, read_checkpoint
 from ngi.machine.captured import Captured, Function
 from ngi.view.run_settings import OpenedRun, made_by, make_samples, opened, plain, settings_of
@@ -18,7 +19,6 @@ from ngi.view.run_settings import OpenedRun, made_by, make_samples, opened, plai
 RECORDS = "ngi.learn.graph_trainer.GraphTrainer"
 """The trainer that has a run's steps recorded."""
 
-CHECKPOINTS = ("last.ckpt", "previous.ckpt")
 NETWORK, AVERAGED = "network.", "averaged.module."
 """What the names of the network's weights, and of their average, begin with in a checkpoint."""
 
@@ -108,7 +108,7 @@ def trained_weights(state: dict[str, Tensor]) -> dict[str, Tensor]:
 def newest_checkpoint(folder: Path) -> dict[str, Any]:
     """Of the run's two checkpoints the newer one that is whole."""
     problems = []
-    for path in (folder / name for name in CHECKPOINTS):
+    for path in (folder / name for name in (LAST, PREVIOUS)):
         if not path.exists():
             continue
         try:

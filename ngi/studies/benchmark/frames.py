@@ -49,13 +49,14 @@ def frames(scene: Scene, *, repeats: int, seconds: float) -> list[Figure]:
 class Ours:
     """Renderer, samples and untrained network of `method=ours` and `budget=small`.
 
-    size: of the network, as '6x128'
+    size: of the network, as '6x128'. precision: of its products on this machine
     """
 
     renderer: MitsubaRenderer
     samples: Samples
     network: nn.Module
     size: str
+    precision: torch.dtype
 
     @classmethod
     def of(cls, scene: Scene) -> Self:
@@ -67,13 +68,13 @@ class Ours:
         samples = build_samples(config, renderer=renderer)
         network = build_network(config, samples=samples).to(training_device(config))
         size = f"{config.model.hidden_layers}x{config.model.hidden_features}"
-        return cls(renderer, samples, network, size)
+        precision = torch.bfloat16 if fast_precision() == "bf16-mixed" else torch.float32
+        return cls(renderer, samples, network, size, precision)
 
     def predict(self, buffers: Tensor, v: Tensor) -> Tensor:
-        """[H, W, 3] radiance, of buffers [H, W, C] and v [D], in this machine's precision."""
+        """[H, W, 3] radiance, of buffers [H, W, C] and v [D]."""
         (seen,) = self.samples.test_inputs(v, resolution=len(buffers))
-        bits = torch.bfloat16 if fast_precision() == "bf16-mixed" else torch.float32
-        return show(self.network, buffers, seen, bits)
+        return show(self.network, buffers, seen, self.precision)
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from ngi.files.durable import write_atomically, write_tensors
 from ngi.learn import Samples
 from ngi.machine.memory import keep_freed_memory
 from ngi.reuse import CompactPatches
-from ngi.studies import provenance as studies
+from ngi.studies import provenance
 from ngi.studies.ceiling.pool import check_count, chosen, render_pool
 from ngi.studies.ceiling.runs import CHUNK, Run, do, measured, plan
 from ngi.studies.ceiling.training import Training
@@ -157,4 +157,4 @@ def claim(folder: Path, config: DictConfig, *, scene: str, backend: str) -> None
         "protocol": plain(config.evaluation.evaluator.protocol),
         **{f"choice {name}": choice for name, choice in study["choices"].items()},
     }
-    studies.claim(folder, made_with, backend=backend, option="run.folder")
+    provenance.claim(folder, made_with, backend=backend, option="run.folder")
