@@ -23,7 +23,7 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 def quick_page(monkeypatch) -> None:
     """The page has tests of its own (test_page.py); its figures take a second per scene."""
     monkeypatch.setattr(
-        "analysis.report.write_page", lambda _contents, file, _progress: file.touch()
+        "analysis.report_files.write_page", lambda _contents, file, _progress: file.touch()
     )
 
 

@@ -15,7 +15,7 @@ def runs(make_run, tmp_path, monkeypatch) -> Path:
     for seed in range(2):
         make_run(seed=seed)
     monkeypatch.setattr(
-        "analysis.report.write_page", lambda _contents, file, _progress: file.touch()
+        "analysis.report_files.write_page", lambda _contents, file, _progress: file.touch()
     )
     return tmp_path / "runs"
 

@@ -6,13 +6,16 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import pandas as pd
 from tqdm import tqdm
 
 from ngi.config.options import option, run_tool
 from ngi.files.durable import write_atomically
 from ngi.studies.stability.case import Case, Row, attempt
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 
 @dataclass
@@ -37,6 +40,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def stability(chosen: StabilityOptions) -> int:
     """Prints and writes the table; ValueError where there is no such group or case."""
+    from pandas import DataFrame
+
     from ngi.studies.stability.groups import GROUPS
 
     names = chosen.groups or [*GROUPS]
@@ -47,7 +52,7 @@ def stability(chosen: StabilityOptions) -> int:
     if not rows:
         known = ", ".join(case.name for cases in groups.values() for case in cases)
         raise ValueError(f"no case has '{chosen.matching}' in its name; there are {known}")
-    table = pd.DataFrame([row.columns() for row in rows])
+    table = DataFrame([row.columns() for row in rows])
     folder = Path(chosen.output)
     file = folder / ("stability_part" if chosen.groups or chosen.matching else "stability")
     folder.mkdir(parents=True, exist_ok=True)
@@ -77,14 +82,14 @@ def run(groups: Mapping[str, Sequence[Case]], *, matching: str = "") -> list[Row
     return rows
 
 
-def markdown(table: pd.DataFrame) -> str:
+def markdown(table: DataFrame) -> str:
     """The rows as Markdown, a table per group, without columns that a group leaves empty."""
     parts = []
     for group, rows in table.groupby("group", sort=False):
         shown = rows.drop(columns="group").dropna(axis="columns", how="all")
         for column in ("error", "limit"):
             if column in shown:
-                shown[column] = [f"{x:.2g}" if pd.notna(x) else "" for x in shown[column]]
+                shown[column] = shown[column].map("{:.2g}".format, na_action="ignore")
         shown["finite"] = ["yes" if finite else "NO" for finite in shown["finite"]]
         parts.append(f"### {group}\n\n{shown.fillna('').to_markdown(index=False)}")
     return "\n\n".join(parts)

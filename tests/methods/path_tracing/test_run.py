@@ -14,7 +14,7 @@ from torch import Tensor, nn
 
 from analysis.frame_times import frame_table
 from analysis.methods import name_methods
-from analysis.report import write_report
+from analysis.report_files import write_report
 from analysis.runs import comparison_warnings, find_runs
 from ngi.methods.path_tracing.frame_time import show
 from ngi.render import AnalyticRenderer

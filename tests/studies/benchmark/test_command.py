@@ -7,6 +7,7 @@ import pytest
 from ngi.studies.benchmark import __main__ as command
 from ngi.studies.benchmark import parts
 from ngi.studies.benchmark.figures import Figure, figure
+from ngi.studies.benchmark.measures import MEASURES
 from ngi.studies.benchmark.part import Options, Part, per_scene
 from ngi.studies.benchmark.scenes import one_per_folder
 
@@ -105,6 +106,10 @@ def test_samples_per_pixel(given, default, expected) -> None:
 def test_bad_options(options, message, capsys: pytest.CaptureFixture[str]) -> None:
     assert command.main(options) == 2
     assert message in capsys.readouterr().err
+
+
+def test_every_part_that_is_listed_is_measured() -> None:
+    assert [part.name for part in parts.PARTS] == list(MEASURES)
 
 
 def test_help_names_every_part(capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,0 +1,164 @@
+"""Everything about the runs below a folder, as files and as one page: what `ngi report` writes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tqdm import tqdm
+
+from analysis.claim_tables import claims_table
+from analysis.claims import CLAIMS
+from analysis.dimensions_plot import write_dimensions_figures
+from analysis.exploration import exploration_table
+from analysis.exploration_plots import write_exploration_figures
+from analysis.films import film_tables
+from analysis.frame_times import frame_table
+from analysis.latex import to_latex
+from analysis.methods import differing_fields, methods_in_order, name_methods, title
+from analysis.page import PageContents, write_page
+from analysis.pairs import ways_left_out
+from analysis.pictures import write_comparisons
+from analysis.plots import method_styles, write_error_curves
+from analysis.provenance import provenance_frame
+from analysis.runs import SETS, Run, check_comparable, comparison_warnings, find_runs
+from analysis.summary import REFERENCE_NOISE, Comparison, Summary, compare, summarise, to_frame
+from analysis.tables import (
+    Table,
+    comparison_table,
+    cost_table,
+    error_table,
+    to_markdown,
+    to_terminal,
+    worst_table,
+)
+from analysis.verdicts import judge
+
+
+@dataclass(frozen=True)
+class Report:
+    """What was written: the text for the terminal, the files, and warnings."""
+
+    text: str
+    files: list[Path]
+    warnings: list[str]
+
+
+def write_report(folder: Path, output: Path) -> Report:
+    """Reads every run below `folder` and writes the page, tables, plots, pictures into `output`.
+
+    Raises ValueError where there is no run or the runs cannot be compared; nothing is written
+    then.
+    """
+    runs, warnings = find_runs(folder)
+    runs = name_methods(runs)
+    check_comparable(runs)
+    doubts = comparison_warnings(runs) + ways_left_out(runs)
+    summaries, styles = summarise(runs), method_styles(runs)
+    comparisons, claims = compare(summaries), judge(runs)
+    films, unreadable = film_tables(folder, runs)
+    found, frames = claims_table(claims), frame_table(runs)
+    tables = [found, error_table(summaries), worst_table(summaries), cost_table(summaries)]
+    tables += [comparison_table(comparisons), frames, *films]
+    warnings += unreadable
+    output.mkdir(parents=True, exist_ok=True)
+    files = _write_tables(tables, runs, summaries, doubts, output)
+    missing = []
+    for scene in _progress(sorted({run.scene for run in runs}), "figures of scenes"):
+        of_scene = [run for run in runs if run.scene == scene]
+        files += write_error_curves(of_scene, styles, output)
+        pictures, lacking = write_comparisons(of_scene, output / "pictures")
+        files += pictures
+        missing += lacking
+    files += write_dimensions_figures(runs, output)
+    exploration = write_exploration_figures(runs, styles, output)
+    warnings += doubts + missing
+    contents = PageContents(
+        name=folder.resolve().name,
+        runs=runs,
+        summaries=summaries,
+        comparisons=comparisons,
+        claims=claims,
+        styles=styles,
+        notes=_notes(runs),
+        warnings=warnings,
+        exploration_table=exploration_table(runs),
+        exploration_files=exploration,
+        films=films,
+    )
+    page = output / "index.html"
+    write_page(contents, page, lambda parts: _progress(parts, "page"))
+    text = _text(runs, summaries, comparisons, [found, frames], films)
+    return Report(text, [page, *files, *exploration], warnings)
+
+
+def _progress(parts: Iterable[Any], what: str) -> Iterable[Any]:
+    """The parts under a progress bar, where someone looks."""
+    return tqdm(parts, desc=what, leave=False, disable=None)
+
+
+def _write_tables(
+    tables: Sequence[Table],
+    runs: Sequence[Run],
+    summaries: Sequence[Summary],
+    doubts: Sequence[str],
+    output: Path,
+) -> list[Path]:
+    csv, markdown, latex = (output / f"results.{suffix}" for suffix in ("csv", "md", "tex"))
+    provenance = output / "provenance.csv"
+    to_frame(summaries).to_csv(csv, index=False)
+    provenance_frame(runs).to_csv(provenance, index=False)
+    filled = [table for table in tables if table.rows]
+    lines = [*_notes(runs), *(f"Warning: {doubt}" for doubt in doubts)]
+    notes = "\n".join(f"- {line}" for line in lines)
+    markdown.write_text("\n\n".join([*map(to_markdown, filled), notes]) + "\n")
+    latex.write_text("\n\n".join(map(to_latex, filled)) + "\n")
+    return [csv, markdown, latex, provenance]
+
+
+def _text(
+    runs: Sequence[Run],
+    summaries: Sequence[Summary],
+    comparisons: Sequence[Comparison],
+    others: Sequence[Table],
+    films: Sequence[Table],
+) -> str:
+    """The same tables for the terminal, a set of frames at a time so that they fit its width."""
+    tables = [table for table in others if table.rows]
+    for name in SETS:
+        tables += [error_table(summaries, [name]), worst_table(summaries, [name])]
+        if comparisons:
+            tables.append(comparison_table(comparisons, [name]))
+    tables += [cost_table(summaries), *films]
+    return "\n\n".join([*map(to_terminal, tables), "\n".join(_notes(runs))])
+
+
+def _notes(runs: Sequence[Run]) -> list[str]:
+    """How to read the tables, and how the methods differ."""
+    protocol = runs[0].result["protocol"]
+    notes = [
+        f"Protocol {protocol['name']} ({protocol['identity']}). Lower is better; a scene's "
+        "lowest mean is marked.",
+        "±: half width of the 95 % interval of the mean over n seeds (Student's t); "
+        "none for one seed.",
+        f"{REFERENCE_NOISE}: what a perfect prediction would score against these references; for "
+        "DSSIM and LPIPS a lower bound, right in order of magnitude.",
+    ]
+    if any(run.label.get("method") for run in runs):
+        notes.append(
+            f"Each of {len(CLAIMS)} claims is refuted by one primary test alone, named beforehand, "
+            "and reproduced where all its tests say so, at 95 % each. This is not corrected for "
+            f"their number: were all untrue, {0.025 * len(CLAIMS):.2f} of them would be called "
+            "reproduced by chance."
+        )
+    fields = differing_fields(runs)
+    for method in methods_in_order(runs):
+        label = next(run.label for run in runs if run.method == method)
+        if fields:
+            chosen = ", ".join(f"{field} {label[field]}" for field in fields)
+            notes.append(f"{title(method)}: {chosen}")
+    reasons = {run.result["lpips_note"] for run in runs if run.result.get("lpips_note")}
+    notes += [f"LPIPS is empty: {reason}" for reason in sorted(reasons)]
+    return notes
