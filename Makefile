@@ -4,7 +4,8 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 SWEEPS := same_time preconditioning resolution target_function acceptance histogram dimensions specular chess cnsr anf denoising sampling \
-	ours_same_time ours_target_function ours_acceptance ours_dimensions
+	ours_same_time ours_preconditioning ours_resolution ours_target_function ours_acceptance ours_histogram ours_dimensions \
+	ours_specular ours_chess ours_cnsr ours_anf
 BUDGET ?= small
 OPTIONS ?=
 SCENE ?= living-room

@@ -40,8 +40,8 @@ class Claim:
     id: name of the sweep that tests it; title: a few words; statement: what the paper says, in our
     words; source: where it says so; test: what we measure and when we call it reproduced, where
     the comparisons alone do not say it; primary: the one test that can refute the claim, its first
-    comparison or its first finding; with_ours: whether the samplings that it is about are compared
-    with our learner in place of the paper's; command: what runs it.
+    comparison or its first finding; with_ours: whether it is judged with our learner in place of
+    the paper's; command: what runs it.
     """
 
     id: str
@@ -191,11 +191,36 @@ WITH_OURS = {
     "loss_target": "ours_loss_target",
     "metropolis": "ours_metropolis",
 }
-"""Methods of the paper, and what is the same with our learner, whose resolution is constant."""
+"""Samplings of the paper, and the same with our learner, whose resolution is constant."""
+
+_OF_CLAIMS = {
+    "preconditioning": {
+        "active_exploration": "ours_paper_network",
+        "no_preconditioning": "ours_no_preconditioning",
+    },
+    "resolution": {
+        "active_exploration": "ours_exploring_growing",
+        "constant_resolution": "ours_exploring",
+        "uniform_growing": "ours_uniform_growing",
+    },
+    "specular": {
+        "traced_specular": "ours_exploring",
+        "active_exploration": "ours_learned_specular",
+    },
+    "cnsr": {"cnsr": "cnsr"},
+    "anf": {"anf": "anf"},
+}
+"""By a claim's id, what it compares beside samplings, or in which our learner differs by itself."""
+
+
+def methods_with_ours(claim: str) -> dict[str, str]:
+    """Methods that the claim with this id compares, and what takes their place with our learner."""
+    return {**WITH_OURS, **_OF_CLAIMS.get(claim, {})}
 
 
 def _with_ours(claim: Claim) -> Claim:
-    """The same claim of the same samplings with our learner, as far as it has them."""
+    """The same claim of our learner, as far as that has what is compared."""
+    ours = methods_with_ours(claim.id)
     return replace(
         claim,
         id=f"ours_{claim.id}",
@@ -203,22 +228,12 @@ def _with_ours(claim: Claim) -> Claim:
         title=f"{claim.title}, with our learner",
         statement=claim.statement.replace("the Adam step", "the optimiser's step"),
         comparisons=tuple(
-            replace(
-                comparison, better=WITH_OURS[comparison.better], worse=WITH_OURS[comparison.worse]
-            )
+            replace(comparison, better=ours[comparison.better], worse=ours[comparison.worse])
             for comparison in claim.comparisons
-            if WITH_OURS.keys() >= {comparison.better, comparison.worse}
+            if ours.keys() >= {comparison.better, comparison.worse}
         ),
     )
 
 
-CLAIMS = (
-    *_OF_THE_PAPER,
-    *(
-        _with_ours(claim)
-        for claim in _OF_THE_PAPER
-        if claim.id in ("same_time", "target_function", "acceptance", "dimensions")
-    ),
-)
-"""What the paper says of samplings is judged with its learner and with ours: all but what concerns
-its network, its resolution or other programs."""
+CLAIMS = (*_OF_THE_PAPER, *map(_with_ours, _OF_THE_PAPER))
+"""All that the paper says is judged with its learner and with ours."""

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pandas as pd
 
-from analysis.claims import SALONS, SEVEN_SCENES, WITH_OURS
+from analysis.claims import SALONS, SEVEN_SCENES, methods_with_ours
 from analysis.evidence import EQUIVALENCE, Finding, Verdict, decide
 from analysis.pairs import (
     log_error,
@@ -54,14 +53,19 @@ def benefit_against_dimensions(
     return [finding if complete else replace(finding, verdict=Verdict.INCONCLUSIVE)]
 
 
-def histogram_follows_target(runs: Sequence[Run]) -> list[Finding]:
+def histogram_follows_target(
+    runs: Sequence[Run],
+    exploration: str = METHOD,
+    metropolis: str = "metropolis",
+    uniform: str = "uniform",
+) -> list[Finding]:
     """Change of the distance between the samples' histogram and the target map over a run.
 
     Mean of the last third of the run less that of the first third, per seed; of the chains alone,
     and beyond what uniform sampling shows while the target map changes.
     """
     never = [run for run in runs if run.label["reuse"] == "never"]
-    methods = (METHOD, "metropolis", "uniform")
+    methods = (exploration, metropolis, uniform)
     present = {run.label.get("method") for run in never if run.scene == "mirror"}
     found = runs_of_one_way(never, "mirror", *(m for m in methods if m in present))
     without_reuse = [
@@ -74,19 +78,19 @@ def histogram_follows_target(runs: Sequence[Run]) -> list[Finding]:
     ends = distances.groupby(by_run)["run_seconds"].transform("max")
     early = distances[distances["run_seconds"] <= ends / 3].groupby(by_run)["distance"].mean()
     late = distances[distances["run_seconds"] > 2 * ends / 3].groupby(by_run)["distance"].mean()
-    changes = (late - early).unstack("method").reindex(columns=[METHOD, "metropolis", "uniform"])
+    changes = (late - early).unstack("method").reindex(columns=[*methods])
     findings = []
-    for method in (METHOD, "metropolis"):
+    for method in (exploration, metropolis):
         text = f"distance of histogram and target map under {method}, last less first third"
         findings.append(_finding(text, changes[method].dropna()))
-        beyond = changes[method] - changes["uniform"]
+        beyond = changes[method] - changes[uniform]
         findings.append(_finding(f"{text}, beyond uniform's change", beyond.dropna()))
     return findings
 
 
-def error_still_falls(runs: Sequence[Run]) -> list[Finding]:
+def error_still_falls(runs: Sequence[Run], method: str = METHOD) -> list[Finding]:
     """Change of the error (geometric mean of the hard metrics) in the second half of the run."""
-    of_scene = _runs_of(runs, "bedroom")
+    of_scene = _runs_of(runs, "bedroom", method)
     changes = []
     for series in log_error_series(of_scene):
         if len(series) > 1:
@@ -98,18 +102,20 @@ def error_still_falls(runs: Sequence[Run]) -> list[Finding]:
     return [_percent_finding(text, [1.0], [np.array(changes)[:, None]], equivalence=EQUIVALENCE)]
 
 
-def many_variables_are_plausible(runs: Sequence[Run]) -> list[Finding]:
+def many_variables_are_plausible(runs: Sequence[Run], method: str = METHOD) -> list[Finding]:
     """Chess against the worst of the seven scenes, and against its own first evaluation.
 
     Which scene is the worst is seen in the same runs: any of them may make the claim true, so that
     the interval is Bonferroni's for as many tests as there are scenes.
     """
-    chess = _runs_of(runs, "chess")
+    chess = _runs_of(runs, "chess", method)
     if not chess:
         return []
     findings = []
     perceived = [m for m in ("dssim", "lpips") if m in shared_metrics(chess, "hard")]
-    scenes = {scene: _log_errors(_runs_of(runs, scene), perceived) for scene in SEVEN_SCENES}
+    scenes = {
+        scene: _log_errors(_runs_of(runs, scene, method), perceived) for scene in SEVEN_SCENES
+    }
     known = {scene: errors for scene, errors in scenes.items() if errors.size}
     if known:
         worst = max(known, key=lambda scene: float(known[scene].mean()))
@@ -127,9 +133,9 @@ def many_variables_are_plausible(runs: Sequence[Run]) -> list[Finding]:
     return findings
 
 
-def _runs_of(runs: Sequence[Run], scene: str) -> list[Run]:
-    """Exploration's, of one way, a run per seed."""
-    return list(runs_of_one_way(runs, scene, METHOD).get(METHOD, {}).values())
+def _runs_of(runs: Sequence[Run], scene: str, method: str) -> list[Run]:
+    """A method's, of one way, a run per seed."""
+    return list(runs_of_one_way(runs, scene, method).get(method, {}).values())
 
 
 def _log_errors(runs: Sequence[Run], metrics: Sequence[str]) -> np.ndarray:
@@ -185,15 +191,23 @@ def _percent_finding(
     return Finding(text, value, low, high, decide(low, high, equivalence=equivalence))
 
 
+_FOUND: Mapping[str, tuple[Callable[..., list[Finding]], tuple[str, ...]]] = {
+    "histogram": (histogram_follows_target, (METHOD, "metropolis", "uniform")),
+    "dimensions": (benefit_against_dimensions, (METHOD, "uniform")),
+    "specular": (error_still_falls, (METHOD,)),
+    "chess": (many_variables_are_plausible, (METHOD,)),
+}
+"""By the id of a claim of the paper: how it is found, and in runs of which methods."""
+
+
+def _with_ours(claim: str) -> Callable[[Sequence[Run]], list[Finding]]:
+    find, methods = _FOUND[claim]
+    ours = [methods_with_ours(claim)[method] for method in methods]
+    return lambda runs: find(runs, *ours)
+
+
 FINDINGS: Mapping[str, Callable[[Sequence[Run]], list[Finding]]] = {
-    "histogram": histogram_follows_target,
-    "dimensions": benefit_against_dimensions,
-    "ours_dimensions": partial(
-        benefit_against_dimensions,
-        exploration=WITH_OURS["active_exploration"],
-        uniform=WITH_OURS["uniform"],
-    ),
-    "specular": error_still_falls,
-    "chess": many_variables_are_plausible,
+    **{claim: find for claim, (find, _) in _FOUND.items()},
+    **{f"ours_{claim}": _with_ours(claim) for claim in _FOUND},
 }
 """By a claim's id; every finding decides."""

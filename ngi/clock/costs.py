@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from ngi.files.durable import write_atomically
+from ngi.files.durable import damage_named, write_atomically
 from ngi.render.protocol import Renderer
 
 Costs = dict[str, dict[str, float]]
@@ -199,15 +199,11 @@ class CostFile:
     def _entries(self) -> dict[str, Any]:
         if not self.path.exists():
             return {}
-        try:
+        advice = "budget.costs: correct it, or delete it and measure again with `ngi costs`"
+        with damage_named(self.path, advice):
             entries: dict[str, Any] = json.loads(self.path.read_text())["components"]
             for key, entry in entries.items():
                 for phase, seconds in entry["seconds"].items():
                     if not (math.isfinite(seconds) and seconds >= 0):
                         raise ValueError(f"{key}.seconds.{phase}: {seconds}")
-        except (ValueError, KeyError, TypeError, AttributeError) as error:
-            raise ValueError(
-                f"budget.costs: {self.path} is damaged ({type(error).__name__}: {error}); correct "
-                "it, or delete it and measure again with `ngi costs`"
-            ) from error
         return entries

@@ -13,6 +13,7 @@ from ngi.evaluate import METRICS, SETS, EvaluationProtocol, Lpips
 from ngi.evaluate.evaluation import mean, worst_mean
 from ngi.evaluate.linear import read_linear
 from ngi.evaluate.metrics import image_metrics, non_finite_pixels
+from ngi.files.durable import damage_named
 
 TOLERANCES = {"float": (1e-6, 1e-9), "half": (1e-2, 1e-3)}
 """Relative and absolute, by the format of the pictures; LPIPS has those of half floats in any case,
@@ -106,8 +107,6 @@ def table(result: Mapping[str, Any], frames: Frames) -> str:
 
 def read_result(file: Path) -> dict[str, Any]:
     """The content of a result.json; ValueError where it is damaged."""
-    try:
+    with damage_named(file):
         result: dict[str, Any] = json.loads(file.read_text())
-    except ValueError as error:
-        raise ValueError(f"{file} is damaged: {error}") from error
     return result

@@ -6,7 +6,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from ngi.files.durable import write_atomically
+from ngi.files.durable import damage_named, write_atomically
 from ngi.machine.provenance import code_commit, code_hash
 
 log = logging.getLogger(__name__)
@@ -32,11 +32,9 @@ def code_versions(folder: Path) -> list[dict[str, Any]]:
     path = folder / FILE
     if not path.exists():
         return []
-    try:
+    with damage_named(path, "delete it, and the run goes on"):
         found: list[dict[str, Any]] = json.loads(path.read_text())
         _ = [[entry[key] for key in ("commit", "dirty", "code", "after_step")] for entry in found]
-    except (ValueError, KeyError, TypeError) as error:
-        raise ValueError(f"{path} is damaged ({error}); delete it, and the run goes on") from error
     return found
 
 

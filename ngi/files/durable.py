@@ -16,6 +16,19 @@ class DamagedError(ValueError):
 
 
 @contextmanager
+def damage_named(path: Path, advice: str = "") -> Iterator[None]:
+    """What is raised where content lacks what belongs there becomes a `DamagedError`.
+
+    It names the file and says what to do, advice. Errors of reading the file are passed on.
+    """
+    try:
+        yield
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        what = f"{path} is damaged ({type(error).__name__}: {error})"
+        raise DamagedError("; ".join(filter(None, (what, advice)))) from error
+
+
+@contextmanager
 def full_disk_named(path: Path) -> Iterator[None]:
     """An OSError inside gets the file's name and what to do about it."""
     try:

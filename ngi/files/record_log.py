@@ -12,7 +12,7 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ngi.files.durable import full_disk_named
+from ngi.files.durable import damage_named, full_disk_named
 from ngi.files.growing_file import GrowingFile
 
 MOST_VARIABLES = 62
@@ -106,13 +106,12 @@ class RecordLog(GrowingFile[BinaryIO]):
         line = stream.readline()
         if not line.endswith(b"\n"):
             return None
-        try:
+        advice = (
+            "its first line says what it holds; put back a copy, or delete it and the same command "
+            "begins a new one at the last checkpoint"
+        )
+        with damage_named(self.path, advice):
             return np.dtype([(n, t, tuple(shape)) for n, t, shape in json.loads(line)["fields"]])
-        except (ValueError, KeyError, TypeError) as error:
-            raise ValueError(
-                f"{self.path} is damaged (first line: {error}); put back a copy, or delete it and "
-                "the same command begins a new one at the last checkpoint"
-            ) from error
 
 
 def _fields(dtype: np.dtype) -> list[list[object]]:

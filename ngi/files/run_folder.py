@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from ngi.files import code_versions
-from ngi.files.durable import write_atomically
+from ngi.files.durable import damage_named, write_atomically
 from ngi.files.record_log import CHAINS, TARGET_MAPS, RecordLog
 from ngi.files.row_log import RowLog
 
@@ -73,13 +73,9 @@ class RunFolder:
         """The finished run's result, or None while the run is not finished."""
         if self.lengthened or self.restarted or not self._result.exists():
             return None
-        try:
+        advice = "delete it, and the same command evaluates the run again from its last checkpoint"
+        with damage_named(self._result, advice):
             result: dict[str, Any] = json.loads(self._result.read_text())
-        except ValueError as error:
-            raise ValueError(
-                f"{self._result} is damaged ({error}); delete it, and the same command evaluates "
-                "the run again from its last checkpoint"
-            ) from error
         return result
 
     def begin(self, *, scene_place: dict[str, Any] | None = None) -> None:
@@ -184,13 +180,8 @@ def kept_settings(folder: Path) -> Any:
     file = folder / SETTINGS
     if not (file.exists() and has_something(folder)):
         return None
-    try:
+    with damage_named(file, "delete it if you are sure that this folder holds the same run"):
         return json.loads(file.read_text())
-    except ValueError as error:
-        raise ValueError(
-            f"{file} is damaged ({error}); delete it if you are sure that this folder holds the "
-            "same run"
-        ) from error
 
 
 def longer(settings: dict[str, Any], *, than: dict[str, Any]) -> bool:

@@ -11,6 +11,7 @@ from hydra.utils import get_object
 from omegaconf import DictConfig, OmegaConf
 
 from ngi.evaluate import EvaluationProtocol
+from ngi.files.durable import damage_named
 from ngi.files.resources import root
 from ngi.learn import PatchSamples, Samples
 from ngi.render import Renderer
@@ -69,10 +70,8 @@ def read_settings(folder: Path) -> dict[str, Any]:
         raise FileNotFoundError(
             f"{path}: no such file; name the folder of one run, outputs/…/seed=0 for example"
         )
-    try:
+    with damage_named(path):
         settings: dict[str, Any] = json.loads(path.read_text())
-    except ValueError as error:
-        raise ValueError(f"{path} is damaged ({error})") from error
     return settings
 
 
@@ -156,14 +155,12 @@ def _remembered_place(folder: Path) -> dict[str, Any] | None:
     path = folder / "scene.json"
     if not path.exists():
         return None
-    try:
+    with damage_named(path, "delete it"):
         place: dict[str, Any] = json.loads(path.read_text())
         if place["_target_"] not in READERS:
             raise ValueError(f"_target_ is {place['_target_']!r}, known are {list(READERS)}")
         if not isinstance(where := place.get("folder", place.get("path")), str):
             raise TypeError(f"it names {where!r} where the scene's folder belongs")
-    except (ValueError, KeyError, TypeError) as error:
-        raise ValueError(f"{path} is damaged ({error}); delete it") from error
     return place
 
 

@@ -11,6 +11,7 @@ from analysis.findings import FINDINGS
 from analysis.methods import TITLES, name_methods
 from analysis.runs import find_runs
 from analysis.verdicts import ClaimResult, judge
+from tests.config.command_line import composed
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 MAKEFILE = (REPOSITORY / "Makefile").read_text()
@@ -22,8 +23,7 @@ def judged(folder: Path) -> dict[str, ClaimResult]:
 
 @pytest.mark.parametrize("claim", CLAIMS, ids=lambda c: c.id)
 def test_a_claim_needs_what_its_sweep_runs(claim) -> None:
-    sweep = yaml.safe_load((REPOSITORY / "sweeps" / f"{claim.id}.yaml").read_text())
-    parameters = sweep["hydra"]["sweeper"]["params"]
+    parameters = composed(f"+sweeps={claim.id}").hydra.sweeper.params
     scenes = {scene for comparison in claim.comparisons for scene in comparison.scenes}
     methods = {m for comparison in claim.comparisons for m in (comparison.better, comparison.worse)}
     assert scenes == set(parameters["scene"].split(","))
@@ -45,7 +45,7 @@ def test_every_claim_has_a_test_that_decides() -> None:
 
 def test_with_our_learner_no_statement_is_about_the_papers_optimiser() -> None:
     ours = [claim for claim in CLAIMS if claim.with_ours]
-    assert len(ours) == 4
+    assert len(ours) == len(CLAIMS) / 2
     assert not any("Adam" in claim.statement for claim in ours)
 
 

@@ -15,7 +15,15 @@ EXPLORING = {
     "ours_loss_target": "mcmc_loss",
     "ours_metropolis": "mcmc_metropolis",
 }
-OURS = ("ours", "ours_uniform", "ours_predicted", "ours_eager", *EXPLORING)
+IN_A_CLAIM = (
+    "ours_exploring_growing",
+    "ours_uniform_growing",
+    "ours_learned_specular",
+    "ours_paper_network",
+    "ours_no_preconditioning",
+)
+"""Ours without what a claim of the paper is about."""
+OURS = ("ours", "ours_uniform", "ours_predicted", "ours_eager", *EXPLORING, *IN_A_CLAIM)
 LIGHT = ["specular", "direct and caustics"]
 METHODS = {  # sampler, resolution, model, what the renderer traces into the buffers
     "active_exploration": ("mcmc_loss_step", "growing", PRECONDITIONED, []),
@@ -41,6 +49,11 @@ METHODS = {  # sampler, resolution, model, what the renderer traces into the buf
         method: (sampler, "constant", "encoded_generator", LIGHT)
         for method, sampler in EXPLORING.items()
     },
+    "ours_exploring_growing": ("mcmc_loss_step", "growing", "encoded_generator", LIGHT),
+    "ours_uniform_growing": ("uniform", "growing", "encoded_generator", LIGHT),
+    "ours_learned_specular": ("mcmc_loss_step", "constant", "encoded_generator", LIGHT[1:]),
+    "ours_paper_network": ("mcmc_loss_step", "constant", PRECONDITIONED, LIGHT),
+    "ours_no_preconditioning": ("mcmc_loss_step", "constant", PLAIN, LIGHT),
     "traced_direct": ("mcmc_loss_step", "growing", PRECONDITIONED, ["direct"]),
 }
 PRIORITISED = {"_target_": "ngi.reuse.Prioritised", "alpha": 0.6, "beta": 0.4, "epsilon": 1e-6}

@@ -8,7 +8,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from ngi.files.durable import write_atomically
+from ngi.files.durable import damage_named, write_atomically
 from ngi.studies.benchmark.figures import Figure
 from ngi.studies.benchmark.tables import markdown
 from ngi.studies.gpu_check.item import Entry, Item, Outcome
@@ -31,10 +31,8 @@ class Record:
         self._about = about
         self._entries: dict[str, Entry] = {}
         if self.path.exists():
-            try:
+            with damage_named(self.path, "delete it"):
                 self._entries = json.loads(self.path.read_text())["items"]
-            except (ValueError, KeyError, TypeError) as error:
-                raise ValueError(f"{self.path} is damaged ({error}); delete it") from error
 
     def to_do(self, items: Sequence[Item]) -> list[Item]:
         """Those without figures. One that failed is tried again; one that crashes is not."""
