@@ -1,7 +1,8 @@
-"""The tables of claims in docs/results.md, from the tables that a report has written.
+"""The tables of claims in docs/results.md, from the tables that reports have written.
 
-`python -m analysis.readme_table RESULTS.md PAGE.md` writes those that the report has runs of, with
-the paper's learner, with ours, or both, between their markers of the page.
+`python -m analysis.readme_table RESULTS.md … PAGE.md` writes those that the reports have runs of,
+with the paper's learner, with ours, or both, between their markers of the page. A claim that
+several have runs of is the first one's.
 """
 
 from __future__ import annotations
@@ -35,20 +36,22 @@ def claim_lines(results: str) -> list[dict[str, str]]:
     return [dict(zip(rows[0], row, strict=True)) for row in rows[2:]]
 
 
-def readme_table(results: str, *, with_ours: bool = False) -> str:
+def readme_table(*results: str, with_ours: bool = False) -> str:
     """A row per claim that has runs: the first line of its evidence, and the verdict on all.
 
     with_ours: of the claims judged with our learner, not of those judged with the paper's. Without
     such runs the text is empty.
     """
-    titles = {claim.id: claim.title for claim in CLAIMS if claim.with_ours == with_ours}
+    judged: dict[str, dict[str, str]] = {}
+    for line in (line for report in results for line in claim_lines(report)):
+        if line["of the claim"]:
+            judged.setdefault(line["claim"], line)
     rows = []
-    for line in claim_lines(results):
-        if line["claim"] not in titles or not (verdict := line["of the claim"]):
-            continue
-        shown = verdict if verdict == Verdict.INCONCLUSIVE else f"**{verdict}**"
-        cells = (titles[line["claim"]], line["compared"], line["difference"], shown)
-        rows.append(markdown_row(cells))
+    for claim in CLAIMS:
+        if claim.with_ours == with_ours and (line := judged.get(claim.id)):
+            verdict = line["of the claim"]
+            shown = verdict if verdict == Verdict.INCONCLUSIVE else f"**{verdict}**"
+            rows.append(markdown_row((claim.title, line["compared"], line["difference"], shown)))
     heading = [
         "| claim of the paper | primary test | difference (95 %) | verdict |",
         "|:--|:--|--:|:--|",
@@ -61,13 +64,13 @@ def markdown_row(cells: Iterable[str]) -> str:
     return f"| {' | '.join(cells)} |"
 
 
-def with_tables(page: str, results: str) -> str:
-    """The page with the tables that `results` has runs of; the others stay as they are.
+def with_tables(page: str, *results: str) -> str:
+    """The page with the tables that `results` have runs of; the others stay as they are.
 
     Raises ValueError where markers are missing.
     """
     for begin, with_ours in ((BEGIN, False), (BEGIN_WITH_OURS, True)):
-        if table := readme_table(results, with_ours=with_ours):
+        if table := readme_table(*results, with_ours=with_ours):
             page = between_markers(page, table, begin=begin, end=END)
     return page
 
@@ -84,11 +87,12 @@ def between_markers(page: str, table: str, *, begin: str, end: str) -> str:
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit status."""
     arguments = sys.argv[1:] if argv is None else argv
-    if len(arguments) != 2:
+    if len(arguments) < 2:
         print(__doc__, file=sys.stderr)
         return 2
-    results, readme = map(Path, arguments)
-    readme.write_text(with_tables(readme.read_text(), results.read_text()))
+    *results, page = map(Path, arguments)
+    reports = [report.read_text() for report in results]
+    page.write_text(with_tables(page.read_text(), *reports))
     return 0
 
 
