@@ -62,8 +62,8 @@ def commands() -> str:
         f'# Commands\n\n```text title="ngi --help"\n{overview()}\n```\n\n'
         "`ngi VERB --help` says what a verb takes. All but `report` and `gpu-check`, which take "
         "`--flags`, take `key=value`; `train` and `costs` also Hydra's `group=option` "
-        "([Groups and options](options.md)), and `train` also `--dry-run`. The first key can be "
-        "left out: `ngi describe mirror` is `ngi describe scene=mirror`.\n\n"
+        "([Groups and options](options.md)), and `train` also `--dry-run`. Of the other verbs the "
+        "first key can be left out: `ngi describe mirror` is `ngi describe scene=mirror`.\n\n"
         f"{table}\n\n"
         "Further programs, for studies of the method itself, are started as modules: "
         "`python -m ngi.studies.noise`, `python -m ngi.studies.exploration_map` with "
@@ -71,7 +71,7 @@ def commands() -> str:
         "`python -m analysis.ceiling`, `python -m analysis.endurance`.\n\n"
         "The exit status is 0 where all went well, 130 after Ctrl-C, 143 after SIGTERM, and 1 or 2 "
         "else. Of `describe`, `doctor`, `metrics` and `stability` 1 says that something was found, "
-        "2 that it could not be looked for.\n"
+        "2 that it could not be looked for; of `gpu-check` 3 says that there is more to measure.\n"
     )
 
 
@@ -95,8 +95,10 @@ def options() -> str:
     ]
     for group, purpose in GROUPS.items():
         lines += ["", f"## {group}", "", purpose]
-        for file in sorted((ROOT / "conf" / group).glob("*.yaml")):
-            lines += ["", f"### {group}={file.stem}", "", *_option(file)]
+        folder = ROOT / "conf" / group
+        for file in sorted(folder.rglob("*.yaml")):
+            option = file.relative_to(folder).with_suffix("")
+            lines += ["", f"### {group}={option}", "", *_option(file)]
     lines += ["", "## sweeps", "", "Started by `ngi train -m +sweeps=NAME`.", ""]
     lines += ["| sweep | what it compares |", "| --- | --- |"]
     for file in sorted((ROOT / "sweeps").glob("*.yaml")):

@@ -58,5 +58,5 @@ if ! llvm >/dev/null && command -v apt-get >/dev/null 2>&1; then
         apt install "libllvm$version" && break
     done
 fi
-llvm || echo "setup: the slower scalar renderer will be used; faster: apt-get install libllvm19" \
-    "(any from 17 on), then make again"
+llvm || echo "setup: the slower scalar renderer will be used, without caustics, which method=ours and" \
+    "make view are refused for; better: apt-get install libllvm19 (any from 17 on), then make again"

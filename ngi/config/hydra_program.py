@@ -1,14 +1,16 @@
 """Programs that Hydra configures: the words of their command lines, and what is wrong with them.
 
-Where the words name neither method nor budget, ours is trained, at a size that suits this machine:
-`ngi train scene=X budget.seconds=60` gives the best network that it can train in that time. A
-method, an experiment, a sweep or another budget, once named, is taken at its word.
+Where the words name no budget, and no method but one of ours, that one (or else `method=ours`) is
+trained at a size that suits this machine: `ngi train scene=X budget.seconds=60` gives the best
+network that it can train in that time. Another method, an experiment, a sweep or another budget,
+once named, is taken at its word.
 
 What is wrong is said once, with the nearest of what there is.
 """
 
 import logging
 import os
+import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from difflib import get_close_matches
@@ -29,8 +31,8 @@ from ngi.config.unread_output import readers_may_leave
 OURS = ("budget=machine", "method=ours")
 """What is added to the words."""
 
-CHOOSING = ("method", "experiment", "sweeps", "path_tracing")
-"""Groups whose choice says what is trained."""
+CHOOSING = ("experiment", "sweeps", "path_tracing")
+"""Groups whose choice says what is trained, and for how long."""
 
 
 def completed(words: Sequence[str]) -> list[str]:
@@ -40,7 +42,10 @@ def completed(words: Sequence[str]) -> list[str]:
         for word in words
         if "=" in word and not word.startswith("-")
     }
-    if named.get("budget", "machine") != "machine" or any(group in named for group in CHOOSING):
+    methods = named.get("method", "ours").split(",")
+    of_others = not all(re.match("ours(_[a-z_]+)?(/|$)", method) for method in methods)
+    elsewhere = of_others or any(group in named for group in CHOOSING)
+    if named.get("budget", "machine") != "machine" or elsewhere:
         return list(words)
     return with_overrides(words, *(word for word in OURS if word.split("=")[0] not in named))
 

@@ -16,6 +16,8 @@ from tests.learn.command_line import run
         ("--cfg job", "--cfg job budget=machine method=ours"),
         ("-m sampler=uniform,sobol", "-m budget=machine method=ours sampler=uniform,sobol"),
         ("budget=machine", "method=ours budget=machine"),
+        ("method=ours_eager", "budget=machine method=ours_eager"),
+        ("-m method=ours,ours_without/muon", "-m budget=machine method=ours,ours_without/muon"),
         ("budget=machine method=uniform", "budget=machine method=uniform"),
     ],
 )
@@ -30,6 +32,8 @@ def test_ours_is_trained_where_the_words_leave_it_open(words: str, expected: str
         "budget=small scene=mirror",
         "budget=seconds budget.seconds=60",
         "method=active_exploration",
+        "-m method=ours,active_exploration",
+        "method=ours_eager budget=small",
         "experiment=demo",
         "-m +sweeps=same_time",
         "+path_tracing=oidn",

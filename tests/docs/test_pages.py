@@ -50,9 +50,11 @@ def test_readme_stays_a_front_door() -> None:
 
 def test_every_option_has_its_place_in_the_reference(documentation: ModuleType) -> None:
     page = documentation.options()
-    for file in (ROOT / "conf").glob("*/*.yaml"):
-        if file.parent.name != "hydra":
-            assert f"### {file.parent.name}={file.stem}\n" in page
+    options = [file.relative_to(ROOT / "conf") for file in (ROOT / "conf").rglob("*/*.yaml")]
+    for option in options:
+        group, *names = option.with_suffix("").parts
+        if group != "hydra":
+            assert f"### {group}={'/'.join(names)}\n" in page
     for file in (ROOT / "sweeps").glob("*.yaml"):
         assert f"| `{file.stem}` |" in page
 
