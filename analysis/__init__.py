@@ -16,11 +16,12 @@ logging.getLogger("matplotlib").setLevel(logging.ERROR)
 
 __all__ = ["Results", "load_runs"]
 
+if not TYPE_CHECKING:  # a type checker would take any name for one that is there
 
-def __getattr__(name: str) -> Any:
-    """`Results` and `load_runs`, imported when asked for, so that help waits for no pandas."""
-    if name not in __all__:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from analysis import library
+    def __getattr__(name: str) -> Any:
+        """`Results` and `load_runs`, imported when asked for, so that help waits for no pandas."""
+        if name not in __all__:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        from analysis import library
 
-    return getattr(library, name)
+        return getattr(library, name)

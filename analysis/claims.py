@@ -213,6 +213,14 @@ _OF_CLAIMS = {
 """By a claim's id, what it compares beside samplings, or in which our learner differs by itself."""
 
 
+_DIFFERENCES = {
+    "preconditioning": "The network is the paper's, all else ours, caustics traced.",
+    "resolution": "The constant resolution is that of the frames that are shown.",
+    "specular": "Direct light and caustics are traced both ways.",
+}
+"""What is not as in the paper with our learner, beside the learner; by a claim's id."""
+
+
 def methods_with_ours(claim: str) -> dict[str, str]:
     """Methods that the claim with this id compares, and what takes their place with our learner."""
     return {**WITH_OURS, **_OF_CLAIMS.get(claim, {})}
@@ -221,12 +229,15 @@ def methods_with_ours(claim: str) -> dict[str, str]:
 def _with_ours(claim: Claim) -> Claim:
     """The same claim of our learner, as far as that has what is compared."""
     ours = methods_with_ours(claim.id)
+    statement = claim.statement.replace("the Adam step", "the optimiser's step")
+    if claim.id in _DIFFERENCES:
+        statement = f"{statement} ({_DIFFERENCES[claim.id]})"
     return replace(
         claim,
         id=f"ours_{claim.id}",
         with_ours=True,
         title=f"{claim.title}, with our learner",
-        statement=claim.statement.replace("the Adam step", "the optimiser's step"),
+        statement=statement,
         comparisons=tuple(
             replace(comparison, better=ours[comparison.better], worse=ours[comparison.worse])
             for comparison in claim.comparisons

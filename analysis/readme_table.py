@@ -48,7 +48,8 @@ def readme_table(*results: str, with_ours: bool = False) -> str:
             judged.setdefault(line["claim"], line)
     rows = []
     for claim in CLAIMS:
-        if claim.with_ours == with_ours and (line := judged.get(claim.id)):
+        if claim.with_ours == with_ours and claim.id in judged:
+            line = judged[claim.id]
             verdict = line["of the claim"]
             shown = verdict if verdict == Verdict.INCONCLUSIVE else f"**{verdict}**"
             rows.append(markdown_row((claim.title, line["compared"], line["difference"], shown)))

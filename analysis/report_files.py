@@ -10,8 +10,8 @@ from typing import Any
 from tqdm import tqdm
 
 from analysis.claim_tables import claims_table
-from analysis.claims import CLAIMS
 from analysis.dimensions_plot import write_dimensions_figures
+from analysis.evidence import Verdict
 from analysis.exploration import exploration_table
 from analysis.exploration_plots import write_exploration_figures
 from analysis.films import film_tables
@@ -34,7 +34,7 @@ from analysis.tables import (
     to_terminal,
     worst_table,
 )
-from analysis.verdicts import judge
+from analysis.verdicts import ClaimResult, judge
 
 
 @dataclass(frozen=True)
@@ -58,13 +58,15 @@ def write_report(folder: Path, output: Path) -> Report:
     doubts = comparison_warnings(runs) + ways_left_out(runs)
     summaries, styles = summarise(runs), method_styles(runs)
     comparisons, claims = compare(summaries), judge(runs)
+    notes = _notes(runs, claims)
     films, unreadable = film_tables(folder, runs)
     found, frames = claims_table(claims), frame_table(runs)
     tables = [found, error_table(summaries), worst_table(summaries), cost_table(summaries)]
     tables += [comparison_table(comparisons), frames, *films]
     warnings += unreadable
     output.mkdir(parents=True, exist_ok=True)
-    files = _write_tables(tables, runs, summaries, doubts, output)
+    doubtful = [*notes, *(f"Warning: {doubt}" for doubt in doubts)]
+    files = _write_tables(tables, runs, summaries, doubtful, output)
     missing = []
     for scene in _progress(sorted({run.scene for run in runs}), "figures of scenes"):
         of_scene = [run for run in runs if run.scene == scene]
@@ -82,7 +84,7 @@ def write_report(folder: Path, output: Path) -> Report:
         comparisons=comparisons,
         claims=claims,
         styles=styles,
-        notes=_notes(runs),
+        notes=notes,
         warnings=warnings,
         exploration_table=exploration_table(runs),
         exploration_files=exploration,
@@ -90,7 +92,7 @@ def write_report(folder: Path, output: Path) -> Report:
     )
     page = output / "index.html"
     write_page(contents, page, lambda parts: _progress(parts, "page"))
-    text = _text(runs, summaries, comparisons, [found, frames], films)
+    text = _text(summaries, comparisons, [found, frames], films, notes)
     return Report(text, [page, *files, *exploration], warnings)
 
 
@@ -103,7 +105,7 @@ def _write_tables(
     tables: Sequence[Table],
     runs: Sequence[Run],
     summaries: Sequence[Summary],
-    doubts: Sequence[str],
+    notes: Sequence[str],
     output: Path,
 ) -> list[Path]:
     csv, markdown, latex = (output / f"results.{suffix}" for suffix in ("csv", "md", "tex"))
@@ -111,19 +113,18 @@ def _write_tables(
     to_frame(summaries).to_csv(csv, index=False)
     provenance_frame(runs).to_csv(provenance, index=False)
     filled = [table for table in tables if table.rows]
-    lines = [*_notes(runs), *(f"Warning: {doubt}" for doubt in doubts)]
-    notes = "\n".join(f"- {line}" for line in lines)
-    markdown.write_text("\n\n".join([*map(to_markdown, filled), notes]) + "\n")
+    lines = "\n".join(f"- {note}" for note in notes)
+    markdown.write_text("\n\n".join([*map(to_markdown, filled), lines]) + "\n")
     latex.write_text("\n\n".join(map(to_latex, filled)) + "\n")
     return [csv, markdown, latex, provenance]
 
 
 def _text(
-    runs: Sequence[Run],
     summaries: Sequence[Summary],
     comparisons: Sequence[Comparison],
     others: Sequence[Table],
     films: Sequence[Table],
+    notes: Sequence[str],
 ) -> str:
     """The same tables for the terminal, a set of frames at a time so that they fit its width."""
     tables = [table for table in others if table.rows]
@@ -132,10 +133,10 @@ def _text(
         if comparisons:
             tables.append(comparison_table(comparisons, [name]))
     tables += [cost_table(summaries), *films]
-    return "\n\n".join([*map(to_terminal, tables), "\n".join(_notes(runs))])
+    return "\n\n".join([*map(to_terminal, tables), "\n".join(notes)])
 
 
-def _notes(runs: Sequence[Run]) -> list[str]:
+def _notes(runs: Sequence[Run], claims: Sequence[ClaimResult]) -> list[str]:
     """How to read the tables, and how the methods differ."""
     protocol = runs[0].result["protocol"]
     notes = [
@@ -146,12 +147,12 @@ def _notes(runs: Sequence[Run]) -> list[str]:
         f"{REFERENCE_NOISE}: what a perfect prediction would score against these references; for "
         "DSSIM and LPIPS a lower bound, right in order of magnitude.",
     ]
-    if any(run.label.get("method") for run in runs):
+    if judged := sum(claim.verdict is not Verdict.NOT_RUN for claim in claims):
         notes.append(
-            f"Each of {len(CLAIMS)} claims is refuted by one primary test alone, named beforehand, "
-            "and reproduced where all its tests say so, at 95 % each. This is not corrected for "
-            f"their number: were all untrue, {0.025 * len(CLAIMS):.2f} of them would be called "
-            "reproduced by chance."
+            f"Claims judged: {judged}. Each is refuted by one primary test alone, named "
+            "beforehand, and reproduced where all its tests say so, at 95 % each. This is not "
+            f"corrected for their number: were all untrue, {0.025 * judged:.2f} of them would be "
+            "called reproduced by chance."
         )
     fields = differing_fields(runs)
     for method in methods_in_order(runs):

@@ -38,12 +38,12 @@ CHOOSING = ("experiment", "sweeps", "path_tracing")
 def completed(words: Sequence[str]) -> list[str]:
     """The words of a command line, with `OURS` where they leave method and budget open."""
     named = {
-        word.partition("=")[0].lstrip("+~"): word.partition("=")[2]
+        word.partition("=")[0].lstrip("+"): word.partition("=")[2]
         for word in words
         if "=" in word and not word.startswith("-")
     }
-    methods = named.get("method", "ours").split(",")
-    of_others = not all(re.match("ours(_[a-z_]+)?(/|$)", method) for method in methods)
+    methods = re.split(r"[\s,]+", named.get("method", "ours").strip())
+    of_others = not all(re.fullmatch(r"ours(_\w+)?(/\w+)?", method) for method in methods)
     elsewhere = of_others or any(group in named for group in CHOOSING)
     if named.get("budget", "machine") != "machine" or elsewhere:
         return list(words)

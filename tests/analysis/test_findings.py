@@ -1,14 +1,16 @@
 import math
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from analysis import findings
-from analysis.claims import SALONS
+from analysis.claims import SALONS, methods_with_ours
 from analysis.evidence import Verdict
 from analysis.findings import (
+    FINDINGS,
     benefit_against_dimensions,
     error_still_falls,
     histogram_follows_target,
@@ -113,8 +115,17 @@ def test_chess_alone_is_compared_with_its_start_only(make_method, tmp_path) -> N
     assert (start.low, start.verdict) == (None, Verdict.INCONCLUSIVE)
 
 
-def test_distances_have_to_fall_by_more_than_uniforms(make_method, tmp_path, monkeypatch) -> None:
-    ends = {"uniform": 0.4, "active_exploration": 0.2, "metropolis": 0.42}
+@pytest.mark.parametrize(
+    ("claim", "exploration", "metropolis", "uniform"),
+    [
+        ("histogram", "active_exploration", "metropolis", "uniform"),
+        ("ours_histogram", "ours_exploring", "ours_metropolis", "ours_uniform"),
+    ],
+)
+def test_distances_have_to_fall_by_more_than_uniforms(
+    make_method, tmp_path, monkeypatch, claim, exploration, metropolis, uniform
+) -> None:
+    ends = {uniform: 0.4, exploration: 0.2, metropolis: 0.42}
     for method in ends:
         make_method(method, scene="mirror", reuse="never")
         make_method(method, scene="mirror", seed=1)  # with reuse: not part of the claim
@@ -135,8 +146,8 @@ def test_distances_have_to_fall_by_more_than_uniforms(make_method, tmp_path, mon
         return pd.DataFrame(rows)
 
     monkeypatch.setattr(findings, "histogram_distances", distances)
-    own, own_beyond, other, other_beyond = histogram_follows_target(find_runs(tmp_path)[0])
-    assert "active_exploration" in own.text
+    own, own_beyond, other, other_beyond = FINDINGS[claim](find_runs(tmp_path)[0])
+    assert exploration in own.text
     assert own.value == pytest.approx(-0.3, abs=0.01)
     assert own_beyond.value == pytest.approx(-0.2, abs=0.01)
     assert (own.verdict, own_beyond.verdict) == (Verdict.REPRODUCED, Verdict.REPRODUCED)
@@ -144,6 +155,38 @@ def test_distances_have_to_fall_by_more_than_uniforms(make_method, tmp_path, mon
     assert other.verdict is Verdict.REPRODUCED
     assert other_beyond.value == pytest.approx(0.02, abs=1e-6)
     assert other_beyond.verdict is Verdict.NOT_REPRODUCED
+
+
+@pytest.mark.parametrize(
+    ("claim", "method", "scenes"),
+    [
+        ("dimensions", "active_exploration", SALONS),
+        ("specular", "active_exploration", ("bedroom",)),
+        ("chess", "active_exploration", ("chess", "veach-egg")),
+    ],
+)
+def test_with_our_learner_the_same_is_found_in_the_runs_of_its_methods(
+    make_method, tmp_path, claim, method, scenes
+) -> None:
+    ours = methods_with_ours(claim)
+    for number, scene in enumerate(scenes):
+        make_method(method, scene=scene, error=0.1 + 0.01 * number)
+        make_method(ours[method], scene=scene, error=0.1 + 0.03 * number**2, rate=0.05)
+        for uniform in ("uniform", "ours_uniform"):
+            make_method(uniform, scene=scene)
+    runs = find_runs(tmp_path)[0]
+    papers = {of_ours: of_paper for of_paper, of_ours in ours.items()}
+    renamed = [
+        replace(
+            run,
+            result={**run.result, "label": {**run.label, "method": papers[run.label["method"]]}},
+        )
+        for run in runs
+        if run.label["method"] in papers
+    ]
+    values, of_ours = ([f.value for f in FINDINGS[name](runs)] for name in (claim, f"ours_{claim}"))
+    assert of_ours == [finding.value for finding in FINDINGS[claim](renamed)]
+    assert of_ours != values
 
 
 def test_runs_without_a_target_map_have_no_distances(make_method, tmp_path) -> None:

@@ -9,6 +9,7 @@ from analysis.claims import CLAIMS, SALONS
 from analysis.evidence import ALL_SCENES, Verdict
 from analysis.findings import FINDINGS
 from analysis.methods import TITLES, name_methods
+from analysis.plots import COLOURS, DASHES
 from analysis.runs import find_runs
 from analysis.verdicts import ClaimResult, judge
 from tests.config.command_line import composed
@@ -49,6 +50,25 @@ def test_with_our_learner_no_statement_is_about_the_papers_optimiser() -> None:
     assert not any("Adam" in claim.statement for claim in ours)
 
 
+def test_with_our_learner_each_claim_compares_what_takes_the_papers_place() -> None:
+    """Better first. Of what is only shown beside a claim two methods have no counterpart."""
+    compared = {
+        claim.id: [(c.better, c.worse) for c in claim.comparisons if c.decides] for claim in CLAIMS
+    }
+    assert compared["ours_preconditioning"] == [("ours_paper_network", "ours_no_preconditioning")]
+    assert compared["ours_specular"] == [("ours_exploring", "ours_learned_specular")]
+    assert compared["ours_cnsr"] == [("ours_exploring", "cnsr")]
+    assert compared["ours_resolution"] == [
+        ("ours_exploring_growing", "ours_exploring"),
+        ("ours_uniform", "ours_uniform_growing"),
+    ]
+    number = {claim.id: len(claim.comparisons) for claim in CLAIMS}
+    papers = {claim.id for claim in CLAIMS if not claim.with_ours}
+    without = {claim: number[claim] - number[f"ours_{claim}"] for claim in papers}
+    assert {claim: n for claim, n in without.items() if n} == {"same_time": 1, "target_function": 1}
+    assert all(len(compared[claim]) == len(compared[f"ours_{claim}"]) for claim in papers)
+
+
 def test_the_claim_on_anf_is_at_the_samples_that_anf_gets() -> None:
     (claim,) = [claim for claim in CLAIMS if claim.id == "anf"]
     method = yaml.safe_load((REPOSITORY / "conf" / "method" / "anf.yaml").read_text())
@@ -61,6 +81,10 @@ def test_the_claim_on_anf_is_at_the_samples_that_anf_gets() -> None:
 def test_every_option_of_method_has_a_title() -> None:
     options = {file.stem for file in (REPOSITORY / "conf" / "method").glob("*.yaml")}
     assert options == set(TITLES)
+
+
+def test_no_two_methods_have_the_same_curve() -> None:
+    assert len(COLOURS) * len(DASHES) >= len(TITLES)
 
 
 def test_claims_without_runs_say_how_to_run_them(make_run, tmp_path) -> None:

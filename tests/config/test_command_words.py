@@ -33,6 +33,7 @@ def test_ours_is_trained_where_the_words_leave_it_open(words: str, expected: str
         "budget=seconds budget.seconds=60",
         "method=active_exploration",
         "-m method=ours,active_exploration",
+        "method=oursome",
         "method=ours_eager budget=small",
         "experiment=demo",
         "-m +sweeps=same_time",

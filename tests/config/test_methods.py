@@ -203,3 +203,11 @@ def test_claims_are_judged_with_the_same_samplings_and_our_learner(
     parts = ("model", "loss", "optimizer", "schedule", "averaging", "data", "renderer", "reuse")
     for part in (*parts, "resolution", "budget"):
         assert ours[part] == learner[part]
+
+
+@pytest.mark.parametrize("method", ["ours_exploring_growing", "ours_uniform_growing"])
+def test_with_our_learner_the_resolution_grows_as_with_the_papers(method: str) -> None:
+    ours, papers = (
+        composed("budget=small", f"method={name}") for name in (method, "active_exploration")
+    )
+    assert ours.resolution == papers.resolution

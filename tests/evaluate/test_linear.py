@@ -181,7 +181,7 @@ def test_a_changed_number_is_found(run: Path, capsys) -> None:
         ("gone", "hard_02_prediction.exr cannot be read"),
         ("size", "hard_02_prediction.exr and its reference are of 8 x 8 and 33 x 33 pixels"),
         ("protocol", "which this program knows as"),
-        ("damaged", "result.json is damaged: Expecting value"),
+        ("damaged", "result.json is damaged (JSONDecodeError: Expecting value"),
         ("folder", "holds no finished run"),
     ],
 )
