@@ -26,7 +26,11 @@ from analysis.verdicts import judge
 ROOT = Path(__file__).resolve().parents[2]
 
 
-REPORTS = ["docs/small/results.md", "docs/small/ours/results.md"]
+REPORTS = [
+    "docs/small/results.md",
+    "docs/small/ours/results.md",
+    "docs/small/ours/claims/results.md",
+]
 
 
 def test_the_page_of_results_has_the_numbers_and_verdicts_of_the_reports() -> None:
