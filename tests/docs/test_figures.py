@@ -66,7 +66,7 @@ def test_the_readme_says_of_ours_exploring_what_its_report_says() -> None:
     measured = [line["difference"] for line in lines if line["claim"] == "ours_same_time"]
     assert measured == ["+{} % [+{}, +{}]".format(*shown)]
     refuted, open_ = said("README.md", r"either, (nor is .+?); (.+?) stay inconclusive")
-    reproduced = said("README.md", r"stay inconclusive\. Reproduced: (.+?)\(\[147 runs")[0]
+    reproduced = said("README.md", r"stay inconclusive\. Reproduced: (.+?)\(\[153 runs")[0]
     also = {"than ANF": "anf", "than CNSR": "cnsr", "position preconditioning": "preconditioning"}
     shown = {
         f"ours_{claim}": verdict
