@@ -212,7 +212,6 @@ _OF_CLAIMS = {
 }
 """By a claim's id, what it compares beside samplings, or in which our learner differs by itself."""
 
-
 _DIFFERENCES = {
     "preconditioning": "The network is the paper's, all else ours, caustics traced.",
     "resolution": "The constant resolution is that of the frames that are shown.",

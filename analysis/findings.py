@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -26,16 +27,19 @@ from analysis.target_map import histogram_distances
 
 METHOD = "active_exploration"
 
+Methods = Mapping[str, str]
+"""By the paper's method, the one whose runs are looked at in its place."""
+PAPERS: Methods = {}
+"""The paper's own."""
 
-def benefit_against_dimensions(
-    runs: Sequence[Run], exploration: str = METHOD, uniform: str = "uniform"
-) -> list[Finding]:
+
+def benefit_against_dimensions(runs: Sequence[Run], ours: Methods = PAPERS) -> list[Finding]:
     """Slope of the log ratio exploration / uniform on hard frames over log2 of the variables.
 
-    exploration, uniform: the methods that are compared
     Least squares over the Salons that were run; every Salon's seeds and frames are resampled.
     Inconclusive until all five were run.
     """
+    exploration, uniform = (ours.get(name, name) for name in (METHOD, "uniform"))
     dimensions, samples = [], []
     for salon in SALONS:
         if pairs := pair_runs(runs, salon, exploration, uniform):
@@ -53,19 +57,15 @@ def benefit_against_dimensions(
     return [finding if complete else replace(finding, verdict=Verdict.INCONCLUSIVE)]
 
 
-def histogram_follows_target(
-    runs: Sequence[Run],
-    exploration: str = METHOD,
-    metropolis: str = "metropolis",
-    uniform: str = "uniform",
-) -> list[Finding]:
+def histogram_follows_target(runs: Sequence[Run], ours: Methods = PAPERS) -> list[Finding]:
     """Change of the distance between the samples' histogram and the target map over a run.
 
     Mean of the last third of the run less that of the first third, per seed; of the chains alone,
     and beyond what uniform sampling shows while the target map changes.
     """
     never = [run for run in runs if run.label["reuse"] == "never"]
-    methods = (exploration, metropolis, uniform)
+    methods = [ours.get(name, name) for name in (METHOD, "metropolis", "uniform")]
+    *exploring, uniform = methods
     present = {run.label.get("method") for run in never if run.scene == "mirror"}
     found = runs_of_one_way(never, "mirror", *(m for m in methods if m in present))
     without_reuse = [
@@ -78,9 +78,9 @@ def histogram_follows_target(
     ends = distances.groupby(by_run)["run_seconds"].transform("max")
     early = distances[distances["run_seconds"] <= ends / 3].groupby(by_run)["distance"].mean()
     late = distances[distances["run_seconds"] > 2 * ends / 3].groupby(by_run)["distance"].mean()
-    changes = (late - early).unstack("method").reindex(columns=[*methods])
+    changes = (late - early).unstack("method").reindex(columns=methods)
     findings = []
-    for method in (exploration, metropolis):
+    for method in exploring:
         text = f"distance of histogram and target map under {method}, last less first third"
         findings.append(_finding(text, changes[method].dropna()))
         beyond = changes[method] - changes[uniform]
@@ -88,9 +88,9 @@ def histogram_follows_target(
     return findings
 
 
-def error_still_falls(runs: Sequence[Run], method: str = METHOD) -> list[Finding]:
+def error_still_falls(runs: Sequence[Run], ours: Methods = PAPERS) -> list[Finding]:
     """Change of the error (geometric mean of the hard metrics) in the second half of the run."""
-    of_scene = _runs_of(runs, "bedroom", method)
+    of_scene = _runs_of(runs, "bedroom", ours.get(METHOD, METHOD))
     changes = []
     for series in log_error_series(of_scene):
         if len(series) > 1:
@@ -102,12 +102,13 @@ def error_still_falls(runs: Sequence[Run], method: str = METHOD) -> list[Finding
     return [_percent_finding(text, [1.0], [np.array(changes)[:, None]], equivalence=EQUIVALENCE)]
 
 
-def many_variables_are_plausible(runs: Sequence[Run], method: str = METHOD) -> list[Finding]:
+def many_variables_are_plausible(runs: Sequence[Run], ours: Methods = PAPERS) -> list[Finding]:
     """Chess against the worst of the seven scenes, and against its own first evaluation.
 
     Which scene is the worst is seen in the same runs: any of them may make the claim true, so that
     the interval is Bonferroni's for as many tests as there are scenes.
     """
+    method = ours.get(METHOD, METHOD)
     chess = _runs_of(runs, "chess", method)
     if not chess:
         return []
@@ -191,23 +192,16 @@ def _percent_finding(
     return Finding(text, value, low, high, decide(low, high, equivalence=equivalence))
 
 
-_FOUND: Mapping[str, tuple[Callable[..., list[Finding]], tuple[str, ...]]] = {
-    "histogram": (histogram_follows_target, (METHOD, "metropolis", "uniform")),
-    "dimensions": (benefit_against_dimensions, (METHOD, "uniform")),
-    "specular": (error_still_falls, (METHOD,)),
-    "chess": (many_variables_are_plausible, (METHOD,)),
+_FOUND: Mapping[str, Callable[..., list[Finding]]] = {
+    "histogram": histogram_follows_target,
+    "dimensions": benefit_against_dimensions,
+    "specular": error_still_falls,
+    "chess": many_variables_are_plausible,
 }
-"""By the id of a claim of the paper: how it is found, and in runs of which methods."""
-
-
-def _with_ours(claim: str) -> Callable[[Sequence[Run]], list[Finding]]:
-    find, methods = _FOUND[claim]
-    ours = [methods_with_ours(claim)[method] for method in methods]
-    return lambda runs: find(runs, *ours)
-
+"""By the id of a claim of the paper."""
 
 FINDINGS: Mapping[str, Callable[[Sequence[Run]], list[Finding]]] = {
-    **{claim: find for claim, (find, _) in _FOUND.items()},
-    **{f"ours_{claim}": _with_ours(claim) for claim in _FOUND},
+    **_FOUND,
+    **{f"ours_{id_}": partial(find, ours=methods_with_ours(id_)) for id_, find in _FOUND.items()},
 }
 """By a claim's id; every finding decides."""

@@ -36,17 +36,25 @@ def claim_lines(results: str) -> list[dict[str, str]]:
     return [dict(zip(rows[0], row, strict=True)) for row in rows[2:]]
 
 
+def judged_claims(*results: str) -> dict[str, dict[str, str]]:
+    """By the claim's id, the first line of its evidence, which has the verdict on all of it.
+
+    results: contents of results.md; a claim that several have runs of is the first one's
+    """
+    judged: dict[str, dict[str, str]] = {}
+    for line in (line for report in results for line in claim_lines(report)):
+        if line["of the claim"]:
+            judged.setdefault(line["claim"], line)
+    return judged
+
+
 def readme_table(*results: str, with_ours: bool = False) -> str:
     """A row per claim that has runs: the first line of its evidence, and the verdict on all.
 
     with_ours: of the claims judged with our learner, not of those judged with the paper's. Without
     such runs the text is empty.
     """
-    judged: dict[str, dict[str, str]] = {}
-    for line in (line for report in results for line in claim_lines(report)):
-        if line["of the claim"]:
-            judged.setdefault(line["claim"], line)
-    rows = []
+    judged, rows = judged_claims(*results), []
     for claim in CLAIMS:
         if claim.with_ours == with_ours and claim.id in judged:
             line = judged[claim.id]

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from analysis.ceiling import differences
-from analysis.readme_table import claim_lines
+from analysis.readme_table import judged_claims
 from analysis.runs import METRICS
 from analysis.statistics import paired_difference
 from tests.docs.pages import ROOT
@@ -46,8 +46,8 @@ def geometric_mean(evaluations: pd.DataFrame, frames: str, worst: str = "") -> p
 
 
 def test_the_readme_gives_every_claim_the_verdict_of_the_report() -> None:
-    lines = claim_lines((ROOT / "docs/small/results.md").read_text())
-    verdicts = {line["claim"]: line["of the claim"] for line in lines if line["of the claim"]}
+    judged = judged_claims((ROOT / "docs/small/results.md").read_text())
+    verdicts = {claim: line["of the claim"] for claim, line in judged.items()}
     status = said("README.md", r"(?s)## Status\n(.+?)\n- \*\*With our learner")[0]
     marks = [*re.finditer(r"Reproduced\*\*|Inconclusive:|Not reproduced\*\*|\Z", status)]
     shown = [
@@ -60,11 +60,11 @@ def test_the_readme_gives_every_claim_the_verdict_of_the_report() -> None:
 
 
 def test_the_readme_says_of_ours_exploring_what_its_report_says() -> None:
-    lines = claim_lines((ROOT / "docs/small/ours/results.md").read_text())
+    reports = ("docs/small/ours/results.md", "docs/small/ours/claims/results.md")
+    judged = judged_claims(*((ROOT / report).read_text() for report in reports))
     pattern = r"has (\d\.\d) % more error .*? same time \((\d\.\d) to (\d\.\d)\): not"
     shown = said("README.md", pattern)
-    measured = [line["difference"] for line in lines if line["claim"] == "ours_same_time"]
-    assert measured == ["+{} % [+{}, +{}]".format(*shown)]
+    assert judged["ours_same_time"]["difference"] == "+{} % [+{}, +{}]".format(*shown)
     refuted, open_ = said("README.md", r"either, (nor is .+?); (.+?) stay inconclusive")
     reproduced = said("README.md", r"stay inconclusive\. Reproduced: (.+?)\(\[153 runs")[0]
     also = {"than ANF": "anf", "than CNSR": "cnsr", "position preconditioning": "preconditioning"}
@@ -78,11 +78,6 @@ def test_the_readme_says_of_ours_exploring_what_its_report_says() -> None:
         for phrase, claim in {**PHRASES, **also}.items()
         if phrase in text
     }
-    lines += claim_lines((ROOT / "docs/small/ours/claims/results.md").read_text())
-    judged: dict[str, dict[str, str]] = {}
-    for line in lines:
-        if line["of the claim"]:
-            judged.setdefault(line["claim"], line)
     verdicts = {claim: line["of the claim"] for claim, line in judged.items()}
     assert {**shown, "ours_same_time": "not reproduced"} == verdicts
     for phrase, claim in (("CNSR", "cnsr"), ("ANF", "anf"), ("bounces", "specular")):
