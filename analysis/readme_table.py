@@ -1,8 +1,9 @@
-"""The tables of claims in docs/results.md, from the tables that reports have written.
+"""The tables of claims in README.md and docs/results.md, from those that reports have written.
 
-`python -m analysis.readme_table RESULTS.md … PAGE.md` writes those that the reports have runs of,
-with the paper's learner, with ours, or both, between their markers of the page. A claim that
-several have runs of is the first one's.
+`python -m analysis.readme_table RESULTS.md … PAGE.md` writes between the page's markers. A page
+with the marker of verdicts gets one table, claims by learner; any other those tables of tests that
+the reports have runs of, with the paper's learner, with ours, or both. A claim that several
+reports have runs of is the first one's.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from analysis.evidence import Verdict
 
 BEGIN = "<!-- claims: written by analysis.readme_table -->"
 BEGIN_WITH_OURS = "<!-- claims with ours: written by analysis.readme_table -->"
+BEGIN_VERDICTS = "<!-- verdicts: written by analysis.readme_table -->"
 END = "<!-- end of claims -->"
 
 HEADING = "**Claims of the paper**"
@@ -58,14 +60,38 @@ def readme_table(*results: str, with_ours: bool = False) -> str:
     for claim in CLAIMS:
         if claim.with_ours == with_ours and claim.id in judged:
             line = judged[claim.id]
-            verdict = line["of the claim"]
-            shown = verdict if verdict == Verdict.INCONCLUSIVE else f"**{verdict}**"
+            shown = shown_verdict(line)
             rows.append(markdown_row((claim.title, line["compared"], line["difference"], shown)))
     heading = [
         "| claim of the paper | primary test | difference (95 %) | verdict |",
         "|:--|:--|--:|:--|",
     ]
     return "\n".join(heading + rows) if rows else ""
+
+
+def verdict_table(*results: str) -> str:
+    """A row per claim of the paper: the verdicts on it with the paper's learner and with ours."""
+    judged = judged_claims(*results)
+    rows = [
+        markdown_row(
+            (
+                claim.title,
+                *(shown_verdict(judged.get(f"{learner}{claim.id}")) for learner in ("", "ours_")),
+            )
+        )
+        for claim in CLAIMS
+        if not claim.with_ours
+    ]
+    heading = ["| claim of the paper | the paper's learner | with ours |", "|:--|:--|:--|"]
+    return "\n".join(heading + rows)
+
+
+def shown_verdict(line: dict[str, str] | None) -> str:
+    """Bold where it decides; line: the first of a claim's evidence, None where nothing has run."""
+    if line is None:
+        return "not run"
+    verdict = line["of the claim"]
+    return verdict if verdict == Verdict.INCONCLUSIVE else f"**{verdict}**"
 
 
 def markdown_row(cells: Iterable[str]) -> str:
@@ -78,6 +104,8 @@ def with_tables(page: str, *results: str) -> str:
 
     Raises ValueError where markers are missing.
     """
+    if BEGIN_VERDICTS in page:
+        return between_markers(page, verdict_table(*results), begin=BEGIN_VERDICTS, end=END)
     for begin, with_ours in ((BEGIN, False), (BEGIN_WITH_OURS, True)):
         if table := readme_table(*results, with_ours=with_ours):
             page = between_markers(page, table, begin=begin, end=END)

@@ -11,6 +11,7 @@ from analysis.evidence import Verdict, of_tests
 from analysis.methods import name_methods
 from analysis.readme_table import (
     BEGIN,
+    BEGIN_VERDICTS,
     BEGIN_WITH_OURS,
     END,
     between_markers,
@@ -33,12 +34,25 @@ REPORTS = [
 ]
 
 
-def test_the_page_of_results_has_the_numbers_and_verdicts_of_the_reports() -> None:
-    page = (ROOT / "docs" / "results.md").read_text()
+@pytest.mark.parametrize("name", ["README.md", "docs/results.md"])
+def test_pages_have_the_numbers_and_verdicts_of_the_reports(name: str) -> None:
+    page = (ROOT / name).read_text()
     reports = [(ROOT / report).read_text() for report in REPORTS]
+    assert "|:--|" in page
     assert page == with_tables(page, *reports), (
-        f"python -m analysis.readme_table {' '.join(REPORTS)} docs/results.md writes it"
+        f"python -m analysis.readme_table {' '.join(REPORTS)} {name} writes it"
     )
+
+
+def test_the_verdicts_with_both_learners_stand_side_by_side() -> None:
+    heading = "**Claims of the paper**\n\n|claim|of the claim|\n|-|-|\n"
+    rows = "|chess|reproduced|\n|ours_chess|inconclusive|\n|ours_chess||\n|anf|not reproduced|\n"
+    page = with_tables(f"{BEGIN_VERDICTS}\n{END}", f"{heading}{rows}\n")
+    lines = [line for line in page.splitlines() if line.startswith("| ")]
+    assert len(lines) == 12
+    assert lines[-1] == "| 128 variables | **reproduced** | inconclusive |"
+    assert lines[-2].endswith("| **not reproduced** | not run |")
+    assert lines[1].endswith("| not run | not run |")
 
 
 @pytest.mark.parametrize("report", REPORTS)
