@@ -94,9 +94,15 @@ class PhaseClock:
 
     @contextmanager
     def phase(self, name: str) -> Iterator[None]:
-        """Counts the enclosed time as phase `name`; raises KeyError for an unknown phase."""
+        """Counts the enclosed time as phase `name`; raises KeyError for an unknown phase.
+
+        While the clock stands still only pauses are counted.
+        """
         if name not in self.seconds:
             raise KeyError(f"unknown phase '{name}', expected one of {list(self.seconds)}")
+        if not self._stack and name not in PAUSES:
+            yield
+            return
         self._count()
         self._stack.append(name)
         if name in PAUSES:

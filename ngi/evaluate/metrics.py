@@ -136,7 +136,7 @@ class ImageMetrics(TypedDict):
 def image_metrics(
     prediction: Tensor, reference: Tensor, *, protocol: EvaluationProtocol, lpips: Lpips | None
 ) -> ImageMetrics:
-    """prediction, reference: [H, W, 3] linear radiance, at least as large as SSIM's window.
+    """prediction, reference: [H, W, 3] linear radiance, at least `smallest_resolution` a side.
 
     lpips: None where its time is not worth it
     """

@@ -54,7 +54,7 @@ class EvaluationProtocol:
 
     def __post_init__(self) -> None:
         for key, lowest in (
-            ("resolution", max(SMALLEST_RESOLUTION, self.ssim_window)),
+            ("resolution", self.smallest_resolution),
             ("low_discrepancy_frames", 1),
             ("samples_per_pass", 1),
             ("maximum_samples", 2 * self.samples_per_pass),
@@ -67,6 +67,11 @@ class EvaluationProtocol:
                 raise ValueError(self._message(key, "more than 0"))
         if self.ssim_window % 2 == 0:
             raise ValueError(self._message("ssim_window", "odd"))
+
+    @property
+    def smallest_resolution(self) -> int:
+        """Pixels a side of an image that every metric can be measured on."""
+        return max(SMALLEST_RESOLUTION, self.ssim_window)
 
     def _message(self, key: str, expected: str) -> str:
         return (

@@ -156,7 +156,7 @@ class MarkovChains:
         state: ChainState,
         proposals: Proposals,
         patch_ids: Tensor,
-        target_current: Tensor | None,
+        target_current: Tensor,
         target_proposed: Tensor,
         generator: torch.Generator,
         *,
@@ -166,20 +166,20 @@ class MarkovChains:
 
         patch_ids: [n] int64, ids of the stored patches of the proposals
         target_current, target_proposed: [n], of any device, both under the network's current
-            weights; `target_current` is ignored where a chain holds no state, and may be None
+            weights; `target_current` is ignored where a chain holds no state, and everywhere
             where `needs_current` is False
         losses: not looked at, chains know targets only
 
         Two things come before the rule. A chain that holds no state accepts. And NaN or infinite
         targets neither win nor block: such a proposal is never accepted, and a chain whose current
         state has such a target accepts any proposal that has not.
-        Raises ValueError for missing targets, wrong lengths and negative ids.
+        Raises ValueError for wrong lengths and negative ids.
         """
         proposed = self._per_chain("target_proposed", target_proposed, state).double()
         patch_ids = self._per_chain("patch_ids", patch_ids, state)
         if (patch_ids < 0).any():
             raise ValueError(f"patch_ids: {patch_ids.tolist()}: give the ids of stored patches")
-        current = self._current(target_current, state)
+        current = self._per_chain("target_current", target_current, state).double()
         comparable = proposed.isfinite()
         free = ~state.occupied | ~current.isfinite()
         chosen = self.acceptance(
@@ -198,17 +198,6 @@ class MarkovChains:
             age=moved.age,
         )
         return moved, info
-
-    def _current(self, target: Tensor | None, state: ChainState) -> Tensor:
-        """[n] float64, targets of the current states; zeros where nobody needs them."""
-        if target is not None:
-            return self._per_chain("target_current", target, state).double()
-        if self.needs_current:
-            raise ValueError(
-                f"target_current: None: {type(self.acceptance).__name__} acceptance needs the "
-                "targets of the current states"
-            )
-        return torch.zeros_like(state.patch, dtype=torch.float64)
 
     def _per_chain(self, name: str, values: Tensor, state: ChainState) -> Tensor:
         if values.shape != (self.chains,):

@@ -122,7 +122,7 @@ class PredictedLoss:
         state: PredictedState,
         proposals: Proposals,
         patch_ids: Tensor,
-        target_current: Tensor | None,
+        target_current: Tensor,
         target_proposed: Tensor,
         generator: torch.Generator,
         *,

@@ -35,7 +35,7 @@ class Sampler(Protocol):
         state: Any,
         proposals: Proposals,
         patch_ids: Tensor,
-        target_current: Tensor | None,
+        target_current: Tensor,
         target_proposed: Tensor,
         generator: torch.Generator,
         *,
@@ -43,6 +43,7 @@ class Sampler(Protocol):
     ) -> tuple[Any, ChainInfo]:
         """The state once they are rendered: see `MarkovChains.accept`.
 
-        losses: [n], the proposals' training losses before the network was trained on them
+        losses: [n], the proposals' losses before the network was trained on them, without their
+            noise where it is known
         """
         ...

@@ -8,6 +8,7 @@ from ngi.files.run_folder import RunFolder
 from ngi.learn.batch import Batch, Feedback
 from ngi.learn.callbacks import StepLog, callbacks
 from ngi.learn.checkpoint import (
+    STREAM,
     AtomicCheckpointIO,
     checkpoint_bytes,
     prepare_resume,
@@ -33,6 +34,7 @@ from ngi.learn.wandb_tracker import WeightsAndBiases
 
 __all__ = [
     "LARGEST_NORM",
+    "STREAM",
     "AtomicCheckpointIO",
     "BaseRates",
     "Batch",

@@ -8,6 +8,7 @@ from typing import Any
 
 from ngi.evaluate import SETS, Comparison
 from ngi.files.row_log import RowLog
+from ngi.files.run_folder import LAST
 from ngi.learn.remote_tracker import (
     FINISH_SECONDS,
     Remote,
@@ -22,7 +23,7 @@ SWEEP = "WANDB_SWEEP_ID"
 """Set by W&B's agents, which also choose the project and the run's id."""
 
 RESULT = ("result.json", "settings.json", "commits.json", "metrics.csv", "steps.csv")
-NETWORK = ("last.ckpt", "result.json", "settings.json", "scene.json")
+NETWORK = (LAST, "result.json", "settings.json", "scene.json")
 """Files of the artifacts; those of the second are a folder that `ngi view` opens."""
 
 

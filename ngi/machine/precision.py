@@ -1,5 +1,12 @@
 """Which precision products are fastest in on this machine."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import torch
+
 
 def multiplies_bfloat16(device: str) -> bool:
     """Whether a device ('cpu', 'cuda') has units for products in bfloat16.
@@ -19,3 +26,10 @@ def fast_precision() -> str:
 
     device = "cuda" if torch.cuda.is_available() else "cpu"
     return "bf16-mixed" if multiplies_bfloat16(device) else "32-true"
+
+
+def dtype_of(precision: str) -> torch.dtype:
+    """What products are computed in under Lightning's 'bf16-mixed' or '32-true'."""
+    import torch
+
+    return torch.bfloat16 if precision == "bf16-mixed" else torch.float32

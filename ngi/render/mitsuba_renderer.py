@@ -14,7 +14,7 @@ from ngi.machine.backend import activate, describe, mi
 from ngi.render.first_hit import first_hit_of
 from ngi.render.fitting import FittingTracer
 from ngi.render.needs import buffers_are_static
-from ngi.render.projection import Projection
+from ngi.render.projection import Projection, require_told_camera
 from ngi.render.protocol import RenderedPatches, Renderer
 from ngi.render.tracers import tracer_of
 from ngi.render.tracing import (
@@ -51,7 +51,7 @@ class MitsubaRenderer(Renderer):
     specular: 'learned': the buffers are those of the first hit; 'traced': of the first hit that is
         not specular (paper, Fig. 10), see `ngi.render.specular`.
     direct: 'traced': the buffers also hold the direct light, see `ngi.render.direct_light`;
-        'learned': they do not.
+        'with_caustics': caustics as well; 'learned': neither.
     needed_only: leave out what the scene does not need: buffers that tell nothing, static buffers
         rendered again, and most of the rebuilding of what does not move.
 
@@ -188,6 +188,7 @@ class MitsubaRenderer(Renderer):
         return self._encode(self._whole_buffers(resolution, samples))
 
     def cameras(self, scene_vectors: Tensor) -> Tensor:
+        require_told_camera(self._scene)
         return torch.from_numpy(self._scene.description.cameras(scene_vectors.numpy())).float()
 
     def projections(self, scene_vectors: Tensor) -> Tensor:

@@ -7,23 +7,26 @@ from ngi.machine.backend import mi
 from ngi.scene.variable_scene import VariableScene
 
 
+def require_told_camera(scene: VariableScene) -> None:
+    """Raises ValueError where v alone does not tell where the camera is."""
+    if not scene.camera_is_told:
+        raise ValueError(
+            f"{scene.description.name}: the camera is moved by other variables than look_at "
+            "and camera_path, and where it is cannot be told without loading the scene"
+        )
+
+
 class Projection:
     """The perspective camera of a scene, as matrices that take points to the film.
 
-    Raises ValueError where the camera is moved by a variable that does not say what it looks at.
+    Raises ValueError as `require_told_camera` does.
     """
 
     def __init__(self, scene: VariableScene) -> None:
         self._description = scene.description
-        sensor = scene.scene.sensors()[0]
-        parameters = mi.traverse(sensor)
+        require_told_camera(scene)
+        parameters = mi.traverse(scene.scene.sensors()[0])
         self._authored = np.array(parameters["to_world"].matrix, dtype=np.float64).reshape(4, 4)
-        looks = scene.description.camera_part.stop > 0
-        if sensor.id() in scene.moving and not looks:
-            raise ValueError(
-                f"{scene.description.name}: the camera is moved by other variables than look_at "
-                "and camera_path, and where it is cannot be told without loading the scene"
-            )
         self._fov = float(np.ravel(parameters["x_fov"])[0])
         self._shift = [float(np.ravel(parameters[f"principal_point_offset_{a}"])[0]) for a in "xy"]
 

@@ -135,7 +135,7 @@ class Renderer(Protocol):
         """[n, 6] float32, for v [n, D]: where the camera stands and where it looks to.
 
         Its origin, normalised as positions are, and its unit direction in world space; zeros where
-        no component of v places it.
+        no component of v places it. Raises ValueError where the renderer cannot tell.
         """
         ...
 

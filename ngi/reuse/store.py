@@ -93,7 +93,7 @@ class PatchStore:
 
     @property
     def mean_loss(self) -> float:
-        """Mean of the weights with which the patches are drawn; NaN for an empty store."""
+        """Mean of the losses last recorded of the patches; NaN for an empty store."""
         return self._losses[: len(self)].mean().item()
 
     @property

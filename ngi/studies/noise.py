@@ -22,6 +22,7 @@ from ngi.config.configuration import register
 from ngi.config.hydra_program import MESSAGES, completed, fail, run_program, with_overrides
 from ngi.config.values import check_values
 from ngi.files.resources import root
+from ngi.files.run_folder import LAST
 from ngi.studies.costs import in_this_process
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ def measure(config: DictConfig) -> list[tuple[str, float, float, float]]:
 
     check_values(config)
     folder = Path(config.run.folder)
-    path = folder / "last.ckpt"
+    path = folder / LAST
     if not path.exists():
         raise ValueError(f"{path} is not there; name a run as its own command line does")
     checkpoint = learn.read_checkpoint(path)
@@ -60,7 +61,7 @@ def measure(config: DictConfig) -> list[tuple[str, float, float, float]]:
         for name, value in checkpoint["state_dict"].items()
         if name.startswith(NETWORK)
     }
-    states, resolution = _states(config, checkpoint["ExplorationDataModule"])
+    states, resolution = _states(config, checkpoint[learn.STREAM])
     losses: dict[str, list[Tensor]] = {name: [] for name in states}
     for factor in (1, MORE_SAMPLES):
         with closing(_renderer(config, folder, factor=factor)) as renderer:

@@ -87,6 +87,9 @@ def _controls(variable: Variable, start: int) -> list[Control]:
 STEPS = 500
 """Of a slider from one end to the other, at least."""
 
+NO_WIDTH = 1e-12
+"""Least range of a slider, in the variable's units."""
+
 
 class Input(ABC):
     """Shows some components of v, and says what they are once a user has changed it."""
@@ -136,8 +139,12 @@ class Slider(_One):
 
     @property
     def _digits(self) -> int:
-        """After the decimal point, so that a slider has at least `STEPS` values."""
-        return -math.floor(math.log10((self.control.high - self.control.low) / STEPS))
+        """After the decimal point, so that a slider has at least `STEPS` values.
+
+        Of a component without a range, which scenes of the paper's authors may have, it has one.
+        """
+        width = max(self.control.high - self.control.low, NO_WIDTH)
+        return -math.floor(math.log10(width / STEPS))
 
 
 class Switch(_One):

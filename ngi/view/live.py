@@ -132,7 +132,8 @@ def live_view(
     studio = Studio(renderer=run.renderer, predict=predict)
     page = Page(studio, about, resolution=protocol.resolution, host="127.0.0.1", port=port)
     log.info("%s shows the training", page.address)
-    variables = [f"{control.group} {control.name}" for control in about.controls]
+    names = [f"{control.group} {control.name}" for control in about.controls]
+    variables = names if description is None else description.component_names
     return LiveView(run, page=page, studio=studio, variables=variables)
 
 

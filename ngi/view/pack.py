@@ -34,6 +34,7 @@ class PackOptions:
 def pack(options: PackOptions) -> None:
     """Writes the folder; ValueError or OSError for what is wrong."""
     from ngi.files.durable import write_atomically
+    from ngi.files.run_folder import LAST
     from ngi.learn import checkpoint_bytes
     from ngi.view.run_settings import read_settings
     from ngi.view.trained_run import NETWORK, newest_checkpoint, trained_weights
@@ -54,7 +55,7 @@ def pack(options: PackOptions) -> None:
     origin: dict[str, Any] = json.loads(result.read_text())
     out.mkdir(parents=True, exist_ok=True)
     with checkpoint_bytes(content) as view:
-        write_atomically(out / "last.ckpt", view)
+        write_atomically(out / LAST, view)
     for name, kept in (
         ("settings.json", settings),
         ("result.json", {key: origin[key] for key in KEPT_OF_RESULT if key in origin}),

@@ -108,3 +108,5 @@ class Page:
     def _welcome(self, client: viser.ClientHandle) -> None:
         visitor = Visitor(client, self._subject, self._studio, resolution=self._resolution)
         self._studio.open(client.client_id, visitor.wish, visitor.show)
+        if client.client_id not in self._server.get_clients():  # it left while that was built
+            self._studio.close(client.client_id)

@@ -19,7 +19,7 @@ DENOISERS = {f"ngi.denoise.{kind.__name__}": kind for kind in (OpenImageDenoise,
 
 @dataclass(frozen=True, kw_only=True)
 class PathTracedRun(OpenedRun):
-    """Frames of a run of `ngi.denoise`, with the samples per pixel that it had.
+    """Frames of a run of `ngi.methods.path_tracing`, with the samples per pixel that it had.
 
     step: of training, 0
     """

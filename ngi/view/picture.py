@@ -55,10 +55,10 @@ def write_picture(options: PictureOptions) -> None:
         raise ValueError("resolution has to be at least 1, reference at least 0")
     run = TrainedRun.open(Path(options.run), scene_path=options.scene)
     with closing(run.renderer):
-        if options.reference and options.resolution < run.protocol.ssim_window:
+        if options.reference and options.resolution < run.protocol.smallest_resolution:
             raise ValueError(
-                f"resolution: {options.resolution}: DSSIM, which a reference is compared by, takes "
-                f"at least {run.protocol.ssim_window}"
+                f"resolution: {options.resolution}: the metrics that a reference is compared by "
+                f"take at least {run.protocol.smallest_resolution}"
             )
         v = _scene_vector(options, run.renderer)
         begin = perf_counter()

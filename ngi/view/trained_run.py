@@ -14,6 +14,7 @@ from ngi.files.durable import DamagedError
 from ngi.files.run_folder import LAST, PREVIOUS
 from ngi.learn import Samples, network_of, read_checkpoint
 from ngi.machine.captured import Captured, Function
+from ngi.machine.precision import dtype_of
 from ngi.view.run_settings import OpenedRun, made_by, make_samples, opened, plain, settings_of
 
 RECORDS = "ngi.learn.graph_trainer.GraphTrainer"
@@ -77,7 +78,7 @@ class TrainedRun(OpenedRun):
     def predict(self, buffers: Tensor, scene_vector: Tensor) -> Tensor:
         """Buffers [H, W, C] and v [D] in [0, 1] to log1p of linear RGB [H, W, 3], on the CPU."""
         device = next(self.network.parameters()).device
-        reduced = self.precision == "bf16-mixed"
+        reduced = dtype_of(self.precision) == torch.bfloat16
         inputs = self.samples.test_inputs(scene_vector, resolution=len(buffers))
         on_device = (tensor.to(device) for tensor in (buffers, *inputs))
         with torch.autocast(device.type, dtype=torch.bfloat16, enabled=reduced):

@@ -113,7 +113,7 @@ class Visitor:
         camera = self._subject.camera
         assert camera is not None
         there = (mine.position, mine.look_at)
-        if any(_same_view(there, aim) for aim in self._aims):
+        if any(_same_view(there, aim) for aim in tuple(self._aims)):
             return
         v = np.array(self._panel.v)
         moved = camera.components(mine.position, mine.look_at)

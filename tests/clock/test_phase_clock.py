@@ -54,10 +54,17 @@ def test_time_before_start_and_while_stopped_does_not_count() -> None:
     timer = FakeTimer()
     clock = PhaseClock(timer=timer)
     timer.now += 7
+    with clock.phase("score"):  # as a rehearsal does
+        timer.now += 7
     clock.start()
     clock.stop()
     timer.now += 7
+    with clock.phase("train"):
+        timer.now += 7
+    with clock.phase("evaluate"):
+        timer.now += 3
     assert clock.run_seconds == 0
+    assert clock.seconds["evaluate"] == 3
 
 
 def test_an_exception_ends_its_phase() -> None:

@@ -7,6 +7,7 @@ from hydra.utils import instantiate
 
 from ngi.explore import MarkovChains, PredictedLoss
 from ngi.files.resources import scene_folders
+from ngi.learn import PatchSamples, network_of
 from ngi.models import PixelGenerator
 from ngi.patches import BufferLayout
 from ngi.render import AnalyticRenderer
@@ -29,9 +30,11 @@ def test_every_option_builds(group: str, option: str) -> None:
     if group == "sampler":
         assert isinstance(built, MarkovChains | PredictedLoss)
         assert built.chains == 16
-    if group in ("model", "reuse"):
-        arguments = {"scene_dimensions": 3} if group == "model" else {}
-        built = built(layout=BufferLayout(), **arguments)
+    if group == "model":
+        samples = PatchSamples(renderer=AnalyticRenderer(dimensions=3, patch_size=16))
+        built = network_of(samples, built)
+    if group == "reuse":
+        built = built(layout=BufferLayout())
     if group == "data":
         built = built(renderer=AnalyticRenderer(dimensions=3, patch_size=16))
     assert built is not None

@@ -8,7 +8,8 @@ from hydra.utils import instantiate
 
 from ngi.config.build import reuse_policy
 from ngi.files.resources import root
-from ngi.patches import BufferLayout
+from ngi.learn import PatchSamples, network_of
+from ngi.render import AnalyticRenderer
 from ngi.reuse import PolicyState
 from tests.config.command_line import composed
 
@@ -79,7 +80,8 @@ def check_method(method: str, budget: str, *more: str) -> None:
     for part in (config.sampler, config.resolution, config.budget):
         instantiate(part)
     assert reuse_policy(config, samples_per_pixel=32).init() == PolicyState()
-    assert instantiate(config.model)(layout=BufferLayout(), scene_dimensions=3) is not None
+    samples = PatchSamples(renderer=AnalyticRenderer(dimensions=3, patch_size=16))
+    assert network_of(samples, instantiate(config.model)) is not None
 
 
 def test_runs_that_two_sweeps_need_are_one_run() -> None:

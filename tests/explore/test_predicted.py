@@ -92,7 +92,7 @@ def explored(
             losses = 5 + 10 * torch.rand(CHAINS, generator=generator)
         ids = torch.arange(CHAINS) + CHAINS * batch
         state, _ = found.accept(
-            state, proposals, ids, None, torch.zeros(CHAINS), generator, losses=losses
+            state, proposals, ids, *[torch.zeros(CHAINS)] * 2, generator, losses=losses
         )
         if batch >= batches // 2:
             late.append((proposals.position, proposals.weight))
@@ -134,7 +134,7 @@ def test_the_oldest_and_what_is_not_finite_are_forgotten() -> None:
         losses = torch.tensor([batch, float("nan"), float("inf"), batch + 0.5])
         ids = torch.arange(CHAINS)
         state, _ = found.accept(
-            state, proposals, ids, None, torch.zeros(CHAINS), generator, losses=losses
+            state, proposals, ids, *[torch.zeros(CHAINS)] * 2, generator, losses=losses
         )
     assert state.loss.tolist() == [0, 0.5, 1, 1.5, 2, 2.5, 3, 3.5, 4, 4.5]
     assert torch.equal(state.seen[-1], proposals.position[3])
@@ -148,15 +148,8 @@ def test_a_forest_serves_until_an_eighth_of_what_is_remembered_is_newer() -> Non
         before = state.forest
         proposals = found.propose(state, generator, batch=batch)
         losses = torch.rand(CHAINS, generator=generator)
-        state, _ = found.accept(
-            state,
-            proposals,
-            torch.arange(CHAINS),
-            None,
-            torch.zeros(CHAINS),
-            generator,
-            losses=losses,
-        )
+        ids, zeros = torch.arange(CHAINS), torch.zeros(CHAINS)
+        state, _ = found.accept(state, proposals, ids, zeros, zeros, generator, losses=losses)
         seen.append(len(state.seen))
         newer.append(int(state.newer))
         grown.append(not torch.equal(before.threshold, state.forest.threshold))

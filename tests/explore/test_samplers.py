@@ -49,7 +49,7 @@ def explore(sampler, *, dimensions, steps, seed):
         proposals = sampler.propose(state, generator, batch=batch)
         ids = torch.arange(next_id, next_id + sampler.chains)
         next_id += sampler.chains
-        current = sampler.target(signals(state.position)) if sampler.needs_current else None
+        current = sampler.target(signals(state.position))
         state, info = sampler.accept(
             state, proposals, ids, current, sampler.target(signals(proposals.position)), generator
         )

@@ -24,7 +24,7 @@ def batches(proposal, *, count, chains=16, dimensions=5, seed=0):
         assert proposals.large_step.all()
         assert proposals.position.dtype == torch.float32
         ids = torch.arange(chains) + batch * chains
-        state, _ = sampler.accept(state, proposals, ids, None, torch.ones(chains), generator)
+        state, _ = sampler.accept(state, proposals, ids, *[torch.ones(chains)] * 2, generator)
         assert torch.equal(state.position, proposals.position)
         found.append(proposals.position)
     return torch.stack(found)

@@ -16,6 +16,7 @@ LOOK_AT = (
     "{object: camera, property: look_at, "
     "minimum: [-0.5, 0.8, 2, -0.2, 1, 0.3], maximum: [0.5, 1.4, 3, 0.2, 1, 0.3]}"
 )
+MOVED = "{object: camera, property: translation, minimum: [0, 0, 0], maximum: [0.1, 0.2, 0.3]}"
 PATH = "{object: camera, property: camera_path, keys: [[0, 1, 4, 0, 1, 0], [1, 1.5, 3, 0, 1, 0]]}"
 
 
@@ -52,6 +53,17 @@ def test_cameras_are_those_of_the_rays(
         assert error[hit].median() < 1e-3
         middle = torch.nn.functional.normalize(-outgoing[7:10, 7:10].mean(dim=(0, 1)), dim=-1)
         torch.testing.assert_close(middle, direction, rtol=0, atol=5e-3)
+
+
+@pytest.mark.parametrize(("view", "dimensions"), [((), 3), ((LOOK_AT,), 7)])
+def test_where_a_camera_is_that_is_moved_otherwise_is_not_said_wrongly(
+    box_folder: Path, tmp_path: Path, view: tuple[str, ...], dimensions: int
+) -> None:
+    made = renderer(box_folder, tmp_path / "box", *view, MOVED, dimensions=dimensions)
+    vectors = torch.rand(2, made.dimensions)
+    for asked in (made.cameras, made.projections):
+        with pytest.raises(ValueError, match="moved by other variables than look_at"):
+            asked(vectors)
 
 
 def test_a_camera_that_v_does_not_place_tells_nothing(box_folder: Path, tmp_path: Path) -> None:

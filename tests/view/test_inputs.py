@@ -107,3 +107,9 @@ def test_nothing_stands_where_a_handle_would_cover_it(gui: viser.GuiApi) -> None
     for slider in (made._exposure, *sliders):
         assert slider._marks == ()
         assert slider.hint.startswith("from ")
+
+
+def test_what_has_no_range_has_a_slider(gui: viser.GuiApi) -> None:
+    slider = Slider(Control("camera", "x", 0, 0.0, 5e-324))  # as scenes of the authors may say
+    assert slider.add(gui, [0.3]).value == pytest.approx(0.0)
+    assert slider.components(0.0) == {0: 0.0}

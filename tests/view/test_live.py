@@ -14,7 +14,7 @@ import torch
 from ngi.learn import PhaseClock
 from ngi.train import train
 from ngi.view import live
-from ngi.view.live import LiveView, axes
+from ngi.view.live import LiveView, axes, live_view
 from ngi.view.page import Page
 from ngi.view.training_figure import Axis, Visited, training_figure
 from tests.learn.command_line import run
@@ -114,6 +114,20 @@ def test_the_page_shows_runs_whose_samples_are_several_images(
     states = torch.arange(12.0)[None]
     places = {axis.name: float(states[0, axis.component]) for axis in axes(["x", "y"])}
     assert places == {"x": 0, "y": 1, "patch x": 10, "patch y": 11}
+
+
+def test_the_axes_are_called_as_components_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    names = ("a.rotation", "a.rotation_2")
+    monkeypatch.setattr(live, "subject", lambda **_: SimpleNamespace(controls=[]))
+    monkeypatch.setattr(live, "Studio", lambda **_: None)
+    monkeypatch.setattr(live, "Page", lambda *_, **__: SimpleNamespace(address="", gui=None))
+    monkeypatch.setattr(live, "TrainingPanel", lambda _, found: found)
+    of_run: Any = SimpleNamespace(folder=SimpleNamespace(path=Path("run")), renderer=None)
+    description: Any = SimpleNamespace(component_names=names)
+    protocol: Any = SimpleNamespace(resolution=8)
+    view = live_view(of_run, scene_name="a", description=description, protocol=protocol, port=0)
+    found: Any = view._panel
+    assert [axis.name for axis in found] == [*names, "patch x", "patch y"]
 
 
 class Recorded:

@@ -88,7 +88,7 @@ def test_exr_files_hold_linear_radiance(tmp_path: Path) -> None:
         (("out=picture.jpg",), ".png"),
         (("out=nowhere/picture.png",), "no folder nowhere"),
         (("resolution=0",), "at least 1"),
-        (("resolution=8", "reference=4"), "resolution: 8: DSSIM"),
+        (("resolution=31", "reference=4"), "resolution: 31: the metrics"),
         (("resolution=many",), "'resolution=many' is wrong: input should be a valid integer"),
         (("reference=64:",), "'reference=64:' is wrong: input should be a valid integer"),
         (("v=[0.5,",), "'v=[0.5,' is wrong: input should be a valid number"),

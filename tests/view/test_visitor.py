@@ -18,7 +18,7 @@ from ngi.evaluate import EvaluationProtocol  # noqa: E402
 from ngi.render import AnalyticRenderer  # noqa: E402
 from ngi.scene import read_scene, scenes  # noqa: E402
 from ngi.view.inputs import controls  # noqa: E402
-from ngi.view.page import viser_server  # noqa: E402
+from ngi.view.page import Page, viser_server  # noqa: E402
 from ngi.view.scene_view import Place, SceneView  # noqa: E402
 from ngi.view.screen import Screen  # noqa: E402
 from ngi.view.session import Wish  # noqa: E402
@@ -73,8 +73,8 @@ def coloured(buffers: Tensor, v: Tensor) -> Tensor:
     return buffers[..., :3] * v[0]
 
 
-def visitor(browser: Browser) -> Visitor:
-    about = Subject(
+def subject() -> Subject:
+    return Subject(
         name="room",
         folder=Path("run"),
         controls=controls(ROOM),
@@ -86,12 +86,28 @@ def visitor(browser: Browser) -> Visitor:
             samples_per_pass=1, maximum_samples=2,
         ),
     )  # fmt: skip
-    studio = Studio(renderer=AnalyticRenderer(dimensions=7, patch_size=16), predict=coloured)
-    return Visitor(browser, about, studio, resolution=64)  # type: ignore[arg-type]
+
+
+def studio() -> Studio:
+    return Studio(renderer=AnalyticRenderer(dimensions=7, patch_size=16), predict=coloured)
+
+
+def visitor(browser: Browser) -> Visitor:
+    return Visitor(browser, subject(), studio(), resolution=64)  # type: ignore[arg-type]
 
 
 def set_slider(made: Visitor, number: int, value: float) -> None:
     made._panel._inputs[number][1].value = value
+
+
+def test_a_browser_that_left_while_its_controls_were_made_is_drawn_nothing(
+    browser: Browser,
+) -> None:
+    made = studio()
+    page = Page(made, subject(), resolution=64, host="127.0.0.1", port=0)
+    page._welcome(browser)  # type: ignore[arg-type]  # which is not among the server's
+    page.close()
+    assert not made.waiting
 
 
 def test_where_the_page_has_put_the_camera_is_no_wish(browser: Browser) -> None:

@@ -48,7 +48,6 @@ class AffinityDenoiser(nn.Module):
     output of the frame before (Eq. 8).
 
     layout: the buffers of the scene
-    scene_dimensions: not looked at
     hidden_features: of the U-Net's coarsest levels; a quarter of it at full resolution, where
         there are as many features of an embedding, twice as many at each coarser level
     hidden_layers: convolutions of the U-Net, half of them on the way down: so many coarser levels
@@ -68,7 +67,6 @@ class AffinityDenoiser(nn.Module):
         self,
         *,
         layout: BufferLayout,
-        scene_dimensions: int,  # noqa: ARG002
         hidden_features: int = 128,
         hidden_layers: int = 8,
         affinity_features: int = 8,

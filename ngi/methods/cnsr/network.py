@@ -54,7 +54,6 @@ class CNSR(nn.Module):
     encoded; the mean of the codes and the query's camera stand where the `PixelGenerator` has v.
 
     layout: the buffers of the scene
-    scene_dimensions: not looked at: the observations stand for v
     hidden_features, hidden_layers: of the generator; their program's 512 and, with the layer that
         their count of 10 leaves out, 11. The representation has half as many numbers: their 256
 
@@ -70,7 +69,6 @@ class CNSR(nn.Module):
         self,
         *,
         layout: BufferLayout,
-        scene_dimensions: int,  # noqa: ARG002
         hidden_features: int = 512,
         hidden_layers: int = 11,
     ) -> None:

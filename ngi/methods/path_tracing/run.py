@@ -6,7 +6,6 @@ import logging
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-import torch
 from hydra.utils import instantiate
 from omegaconf import DictConfig
 from torch import Tensor
@@ -15,6 +14,7 @@ from ngi.clock.phase_clock import PAUSES, PHASES
 from ngi.config.build import build_network, build_samples, plain, training_device
 from ngi.config.configuration import scene_place
 from ngi.files.code_versions import record_code_version
+from ngi.machine.precision import dtype_of
 from ngi.machine.provenance import provenance
 from ngi.methods.path_tracing.frame_time import Frame, FrameTimes, largest_fitting, show
 from ngi.methods.path_tracing.tracing import PathTracing, Plan
@@ -118,8 +118,7 @@ class _Frames:
         samples = build_samples(config, renderer=renderer)
         network = build_network(config, samples=samples).eval()
         network = network.to(training_device(config))
-        reduced = config.trainer.precision == "bf16-mixed"
-        precision = torch.bfloat16 if reduced else torch.float32
+        precision = dtype_of(config.trainer.precision)
         self._buffers: Frame = partial(renderer.image_buffers, resolution=resolution)
         self._trace: Frame = partial(tracing.trace, resolution=resolution)
         buffers = renderer.image_buffers(renderer.hard_frames()[0], resolution=resolution).cpu()

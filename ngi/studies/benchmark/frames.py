@@ -15,7 +15,7 @@ from ngi.config.build import build_network, build_samples, training_device
 from ngi.config.configuration import composed
 from ngi.denoise import OpenImageDenoise
 from ngi.learn import Samples
-from ngi.machine.precision import fast_precision
+from ngi.machine.precision import dtype_of, fast_precision
 from ngi.machine.timing import in_turn
 from ngi.methods.path_tracing.frame_time import show
 from ngi.methods.path_tracing.tracing import PathTracing
@@ -68,7 +68,7 @@ class Ours:
         samples = build_samples(config, renderer=renderer)
         network = build_network(config, samples=samples).to(training_device(config))
         size = f"{config.model.hidden_layers}x{config.model.hidden_features}"
-        precision = torch.bfloat16 if fast_precision() == "bf16-mixed" else torch.float32
+        precision = dtype_of(fast_precision())
         return cls(renderer, samples, network, size, precision)
 
     def predict(self, buffers: Tensor, v: Tensor) -> Tensor:

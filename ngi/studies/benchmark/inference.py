@@ -7,7 +7,7 @@ from functools import partial
 
 import torch
 
-from ngi.machine.precision import fast_precision
+from ngi.machine.precision import dtype_of, fast_precision
 from ngi.machine.timing import in_turn
 from ngi.methods.path_tracing.frame_time import show
 from ngi.models import ImageLinear, PatchLinear, PixelGenerator
@@ -53,8 +53,8 @@ def inference(
 
 def precisions() -> dict[str, torch.dtype]:
     """By name; bfloat16 only where the machine does not have to emulate it."""
-    reduced = {"bf16": torch.bfloat16} if fast_precision() == "bf16-mixed" else {}
-    return {**reduced, "fp32": torch.float32}
+    fast = dtype_of(fast_precision())
+    return {"fp32": fast} if fast == torch.float32 else {"bf16": fast, "fp32": torch.float32}
 
 
 def _frames(

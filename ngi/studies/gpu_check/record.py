@@ -39,9 +39,13 @@ class Record:
         return [item for item in items if not self._is_over(item)]
 
     def failed(self, items: Sequence[Item]) -> dict[str, str]:
-        """By item, why."""
+        """By item, why: those that raised, and those that are not begun again after crashes."""
         entries = {item.key: self._entries.get(item.key, {}) for item in items}
-        return {key: entry["failure"] for key, entry in entries.items() if "failure" in entry}
+        return {
+            key: entry.get("failure") or _why(entry)
+            for key, entry in entries.items()
+            if "failure" in entry or _crashes(entry)
+        }
 
     def begin(self, item: Item) -> None:
         """Before it is measured, so that a crash is not tried for ever."""
@@ -67,7 +71,7 @@ class Record:
 
     def _is_over(self, item: Item) -> bool:
         entry = self._entries.get(item.key, {})
-        return "figures" in entry or entry.get("begun", 0) >= MOST_BEGINNINGS
+        return "figures" in entry or _crashes(entry)
 
     def _keep(self, item: Item, entry: Entry) -> None:
         self._entries[item.key] = entry
@@ -99,9 +103,13 @@ def page(items: Sequence[Item], entries: dict[str, Entry], *, about: dict[str, A
     return "\n\n".join(parts) + "\n"
 
 
+def _crashes(entry: Entry) -> bool:
+    return bool(entry.get("begun", 0) >= MOST_BEGINNINGS)
+
+
 def _why(entry: Entry) -> str:
     if "failure" in entry:
         return str(entry["failure"]).splitlines()[0]
-    if entry.get("begun", 0) >= MOST_BEGINNINGS:
+    if _crashes(entry):
         return f"begun {entry['begun']} times and never ended; delete its entry to try again"
     return "not measured yet"

@@ -14,6 +14,7 @@ from typing import Any
 
 import torch
 
+from ngi.files.run_folder import LAST
 from ngi.learn import read_checkpoint
 from ngi.studies.benchmark.figures import Figure, figure
 from ngi.studies.gpu_check.item import CutOffError, Outcome
@@ -92,7 +93,7 @@ def learning(method: str, folder: Path, seconds: float) -> Outcome:
         place = folder / method / name
         result = run(place, (*overrides, *way), seconds=end - monotonic())
         errors[name] = result["metrics"]["hard"]["mape"]["mean"]
-        weights[name] = read_checkpoint(place / "last.ckpt")["state_dict"]
+        weights[name] = read_checkpoint(place / LAST)["state_dict"]
     apart = 100 * abs(errors["gpu"] / errors["cpu"] - 1)
     again, graphs = (
         all(torch.equal(w, weights[other][n]) for n, w in weights["gpu"].items())

@@ -64,7 +64,7 @@ def test_one_configuration_becomes_cleaner_than_its_input_and_than_blurs_of_it(
     with torch.random.fork_rng():
         torch.manual_seed(0)
         net = AffinityDenoiser(
-            layout=samples.layout, scene_dimensions=len(v), hidden_features=32, hidden_layers=4,
+            layout=samples.layout, hidden_features=32, hidden_layers=4,
             kernel_size=3, dilations=(1, 2, 4),
         )  # fmt: skip
     optimizer = torch.optim.Adam(net.parameters(), lr=3e-3)

@@ -29,7 +29,7 @@ def denoiser(**changes: object) -> AffinityDenoiser:
     sizes = {"hidden_features": 16, "hidden_layers": 4, "dilations": (1, 2), "kernel_size": 3}
     with torch.random.fork_rng():
         torch.manual_seed(0)
-        return AffinityDenoiser(layout=LAYOUT, scene_dimensions=3, **{**sizes, **changes})  # type: ignore[arg-type]
+        return AffinityDenoiser(layout=LAYOUT, **{**sizes, **changes})  # type: ignore[arg-type]
 
 
 def sequence(frames: int = 3, height: int = 12, width: int = 10) -> tuple[Tensor, Tensor, Tensor]:

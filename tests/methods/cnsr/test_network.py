@@ -16,7 +16,7 @@ def network(**options) -> CNSR:
     options = {"hidden_features": 16, "hidden_layers": 3, **options}
     with torch.random.fork_rng():
         torch.manual_seed(2)
-        return CNSR(layout=LAYOUT, scene_dimensions=5, **options)
+        return CNSR(layout=LAYOUT, **options)
 
 
 def inputs(n: int = 2, k: int = 3, size: int = 8, dtype=torch.float64) -> tuple[Tensor, ...]:
@@ -121,7 +121,7 @@ def test_training_in_bfloat16_is_close_to_float32() -> None:
 
 
 def test_its_size_is_that_of_their_program() -> None:
-    model = CNSR(layout=LAYOUT, scene_dimensions=3)
+    model = CNSR(layout=LAYOUT)
     shapes = [list(p.shape) for n, p in model.encoder.named_parameters() if n.endswith("weight")]
     assert shapes == [
         [256, CHANNELS, 2, 2],

@@ -59,9 +59,7 @@ def detail(image: Tensor) -> Tensor:
 def training() -> list[dict[str, float]]:
     """What the network gives of views it has not seen of the one scene it trains on, at times."""
     samples = ObservationSets(renderer=MovingCamera(patch_size=SIZE), observations=3)
-    network = seeded(CNSR, seed=0)(
-        layout=samples.layout, scene_dimensions=4, hidden_features=48, hidden_layers=3
-    )
+    network = seeded(CNSR, seed=0)(layout=samples.layout, hidden_features=48, hidden_layers=3)
     optimizer, loss = (
         torch.optim.Adam(network.parameters(), lr=2e-3),
         L1Dssim(l1_weight=1.0, dssim_weight=1.0),

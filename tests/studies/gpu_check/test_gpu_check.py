@@ -89,7 +89,9 @@ def test_an_item_that_kills_its_process_is_begun_twice_at_most(tmp_path: Path) -
     record = checked(tmp_path, item)
     record.write_page([item])
     assert measure.calls == 2
-    assert "begun 2 times and never ended" in record.page.read_text()
+    why = "begun 2 times and never ended"
+    assert why in record.page.read_text()
+    assert why in record.failed([item])["stage/name"]  # so that the exit status is 1
 
 
 def test_one_that_goes_on_is_begun_as_often_as_it_is_cut_off(tmp_path: Path) -> None:
