@@ -2,6 +2,8 @@
 
 import pandas as pd
 
+from analysis.ceiling import EVERYWHERE, NO_CHOICE, differences
+from analysis.statistics import Estimate, paired_difference
 from tests.docs.pages import ROOT
 from tests.docs.test_figures import geometric_mean
 
@@ -53,6 +55,73 @@ def test_the_papers_learner_where_patches_are_dear_is_said_to_be_what_its_runs_s
         error = geometric_mean(runs, frames, worst)
         change = 100 * error["active_exploration"].to_numpy() / error["uniform"].to_numpy() - 100
         assert row == [f"{each:+.1f} %".replace("-", "−") for each in change]
+
+
+def as_shown(difference: Estimate | None) -> str:
+    """As the tables have it: '+3.0 ± 1.1 % (21)', and without ± where there is one pair."""
+    assert difference is not None
+    interval = "" if difference.half_width is None else f" ± {100 * difference.half_width:.1f}"
+    text = f"{100 * difference.mean:+.1f}{interval} % ({difference.n})"
+    return text.replace("-", "−")
+
+
+def test_how_near_samplers_come_is_what_the_runs_say() -> None:
+    folder = ROOT / "docs/exploration-ceiling"
+    small, scarce, quarter = rows_of(
+        "docs/exploration-ceiling/README.md", "How near samplers come"
+    )[2:]
+    for row, name in ((small, "runs.csv"), (scarce, "scarce_ceiling.csv")):
+        found = differences(pd.read_csv(folder / name).query("steps == 1600"))
+        found = found[(found["scene"] == EVERYWHERE) & (found["error"] == "hard_error")]
+        by_choice = {
+            each["choice"]: Estimate(each["difference"], each["half_width"], each["seeds"])
+            for each in found.to_dict("records")
+        }
+        assert row[:2] == [as_shown(by_choice[choice]) for choice in (NO_CHOICE, "oracle")]
+
+    same_time = pd.read_csv(folder / "same_time.csv").set_index(["method", "scene", "seed"])
+    noise = pd.read_csv(folder / "without_noise.csv").query("budget == 'small'")
+    chains = noise.set_index(["method", "scene", "seed"])["hard_error"]
+    scarce_runs = pd.read_csv(folder / "scarce_chains.csv").groupby(["method", "scene", "seed"])
+    for row, predicted, of_chains in (
+        (small, geometric_mean(same_time, "hard"), chains),
+        (scarce, *[geometric_mean(scarce_runs.last(), "hard")] * 2),
+    ):
+        assert row[2:] == [
+            as_shown(paired_difference(error[base].to_dict(), error[other].to_dict()))
+            for error, base, other in (
+                (predicted, "ours", "ours_predicted"),
+                (of_chains, "ours_uniform", "ours_exploring"),
+            )
+        ]
+
+    runs = pd.read_csv(folder / "quarter_hour.csv").set_index(
+        ["scene", "seed", "patches", "choice"]
+    )
+    error = runs["hard_error"].unstack(["patches", "choice"])
+    base = error[1792, "uniform"].to_dict()
+    for cell, run in zip(quarter, ((4096, "uniform"), (1792, "oracle")), strict=False):
+        difference = paired_difference(base, error[run].dropna().to_dict())
+        assert difference is not None
+        assert cell == f"{100 * difference.mean:+.1f} % ({difference.n})".replace("-", "−")
+
+
+def test_what_could_be_had_at_a_tenth_is_what_the_runs_say() -> None:
+    runs = pd.read_csv(ROOT / "docs/exploration-ceiling/known/tenth.csv").set_index(
+        ["share", "seed"]
+    )
+    page = (ROOT / "docs/exploration-ceiling/predicted-losses.md").read_text()
+    lines = page.split("### What could be had at a tenth")[1].split("\n\n")[2].splitlines()
+    for share, line in zip((0.0, 0.1, 0.3), lines[2:], strict=True):
+        here, uniform = runs.loc[share], runs.loc[0.0]
+        cells = [cell.strip() for cell in line.split("|")[2:-1]]
+        assert cells[:2] == [f"{here['lit'].mean():.3f}", f"{here['error_tail'].mean():.3f}"]
+        for cell, name in zip(cells[2:], ("error_tail", "error_uniform"), strict=True):
+            difference = paired_difference(uniform[name].to_dict(), here[name].to_dict())
+            assert difference is not None
+            assert difference.half_width is not None
+            measured = f"{percent(100 * difference.mean)} % ± {100 * difference.half_width:.0f}"
+            assert cell == (measured if share else "")
 
 
 def percent(number: float) -> str:
