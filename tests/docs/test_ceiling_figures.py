@@ -124,6 +124,21 @@ def test_what_could_be_had_at_a_tenth_is_what_the_runs_say() -> None:
             assert cell == (measured if share else "")
 
 
+def test_what_is_said_of_how_chains_mix_is_what_their_traces_say() -> None:
+    runs = pd.read_csv(ROOT / "docs/exploration-ceiling/mixing.csv")
+    page = (ROOT / "docs/exploration-ceiling/predicted-losses.md").read_text()
+    said = page.split("their states are alike.**")[1].split("\n")[0]
+    for words, column, factor in (
+        ("they accept {} to {} % of their", "acceptance", 100),
+        ("only {} to {} count as", "effective_positions", 1),
+        ("({} to {} by their targets", "effective_targets", 1),
+        ("they accept {} to {} %, let", "large_step_acceptance", 100),
+    ):
+        ends = (round(factor * runs[column].min()), round(factor * runs[column].max()))
+        assert words.format(*ends) in said
+    assert set(runs["median_lifetime"]) == {1, 2}
+
+
 def percent(number: float) -> str:
     """Without decimals, as pages have it."""
     rounded = round(number)
