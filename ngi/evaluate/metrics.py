@@ -136,9 +136,9 @@ class ImageMetrics(TypedDict):
 def image_metrics(
     prediction: Tensor, reference: Tensor, *, protocol: EvaluationProtocol, lpips: Lpips | None
 ) -> ImageMetrics:
-    """prediction, reference: [H, W, 3] linear radiance, at least `smallest_resolution` a side.
+    """prediction, reference: [H, W, 3] linear radiance, at least SSIM's window a side.
 
-    lpips: None where its time is not worth it
+    lpips: None where its time is not worth it; it takes at least `SMALLEST_RESOLUTION` a side
     """
     picture = tone_map(prediction, protocol.exposure)
     wanted = tone_map(reference, protocol.exposure)

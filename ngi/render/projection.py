@@ -8,11 +8,11 @@ from ngi.scene.variable_scene import VariableScene
 
 
 def require_told_camera(scene: VariableScene) -> None:
-    """Raises ValueError where v alone does not tell where the camera is."""
-    if not scene.camera_is_told:
+    """Raises ValueError where another variable than look_at and camera_path moves the camera."""
+    if scene.scene.sensors()[0].id() in scene.moving:
         raise ValueError(
             f"{scene.description.name}: the camera is moved by other variables than look_at "
-            "and camera_path, and where it is cannot be told without loading the scene"
+            "and camera_path: where it is these alone do not tell"
         )
 
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from ngi.machine.backend import mi
 from ngi.scene.arrangement import arranged, moving
 from ngi.scene.description import SceneDescription
-from ngi.scene.kinds import CameraPath, LookAt, Material
+from ngi.scene.kinds import Material
 from ngi.scene.loading import load
 from ngi.scene.scene_parameters import SceneParameters, has_surface
 from ngi.scene.variable import DiscreteVariable, Variable, Write
@@ -58,16 +58,6 @@ class VariableScene:
     def moving(self) -> frozenset[str]:
         """Ids of the shapes and cameras that some variable places, shows or hides."""
         return frozenset(moving(self.description.variables))
-
-    @cached_property
-    def camera_is_told(self) -> bool:
-        """Whether nothing moves the camera but variables that say what it looks at."""
-        others = [
-            variable
-            for variable in self.description.variables
-            if not isinstance(variable, LookAt | CameraPath)
-        ]
-        return self.scene.sensors()[0].id() not in moving(others)
 
     @cached_property
     def affected(self) -> frozenset[str]:

@@ -132,8 +132,10 @@ def live_view(
     studio = Studio(renderer=run.renderer, predict=predict)
     page = Page(studio, about, resolution=protocol.resolution, host="127.0.0.1", port=port)
     log.info("%s shows the training", page.address)
-    names = [f"{control.group} {control.name}" for control in about.controls]
-    variables = names if description is None else description.component_names
+    if description is None:
+        variables: Sequence[str] = [f"{control.group} {control.name}" for control in about.controls]
+    else:
+        variables = description.component_names
     return LiveView(run, page=page, studio=studio, variables=variables)
 
 

@@ -77,11 +77,10 @@ class TrainedRun(OpenedRun):
 
     def predict(self, buffers: Tensor, scene_vector: Tensor) -> Tensor:
         """Buffers [H, W, C] and v [D] in [0, 1] to log1p of linear RGB [H, W, 3], on the CPU."""
-        device = next(self.network.parameters()).device
-        reduced = dtype_of(self.precision) == torch.bfloat16
+        device, dtype = next(self.network.parameters()).device, dtype_of(self.precision)
         inputs = self.samples.test_inputs(scene_vector, resolution=len(buffers))
         on_device = (tensor.to(device) for tensor in (buffers, *inputs))
-        with torch.autocast(device.type, dtype=torch.bfloat16, enabled=reduced):
+        with torch.autocast(device.type, torch.bfloat16, enabled=dtype == torch.bfloat16):
             output: Tensor = self.image(*on_device)[0]
         return output.float().cpu()
 

@@ -61,7 +61,8 @@ def as_shown(difference: Estimate | None) -> str:
     """As the tables have it: '+3.0 ± 1.1 % (21)', and without ± where there is one pair."""
     assert difference is not None
     interval = "" if difference.half_width is None else f" ± {100 * difference.half_width:.1f}"
-    text = f"{100 * difference.mean:+.1f}{interval} % ({difference.n})"
+    mean = f"{100 * difference.mean:+.1f}".replace("-0.0", "0.0")
+    text = f"{mean}{interval} % ({difference.n})"
     return text.replace("-", "−")
 
 
@@ -79,21 +80,16 @@ def test_how_near_samplers_come_is_what_the_runs_say() -> None:
         }
         assert row[:2] == [as_shown(by_choice[choice]) for choice in (NO_CHOICE, "oracle")]
 
-    same_time = pd.read_csv(folder / "same_time.csv").set_index(["method", "scene", "seed"])
-    noise = pd.read_csv(folder / "without_noise.csv").query("budget == 'small'")
-    chains = noise.set_index(["method", "scene", "seed"])["hard_error"]
-    scarce_runs = pd.read_csv(folder / "scarce_chains.csv").groupby(["method", "scene", "seed"])
-    for row, predicted, of_chains in (
-        (small, geometric_mean(same_time, "hard"), chains),
-        (scarce, *[geometric_mean(scarce_runs.last(), "hard")] * 2),
+    run = ["method", "scene", "seed"]
+    same_time = pd.read_csv(folder / "same_time.csv").set_index(run)
+    scarce_runs = pd.read_csv(folder / "scarce_chains.csv").groupby(run).last()
+    chains = pd.read_csv(folder / "without_noise.csv").query("budget == 'small'").set_index(run)
+    for cell, error, base, other in (
+        (small[2], geometric_mean(same_time, "hard"), "ours", "ours_predicted"),
+        (small[3], chains["hard_error"], "ours_uniform", "ours_exploring"),
+        (scarce[3], geometric_mean(scarce_runs, "hard"), "ours_uniform", "ours_exploring"),
     ):
-        assert row[2:] == [
-            as_shown(paired_difference(error[base].to_dict(), error[other].to_dict()))
-            for error, base, other in (
-                (predicted, "ours", "ours_predicted"),
-                (of_chains, "ours_uniform", "ours_exploring"),
-            )
-        ]
+        assert cell == as_shown(paired_difference(error[base].to_dict(), error[other].to_dict()))
 
     runs = pd.read_csv(folder / "quarter_hour.csv").set_index(
         ["scene", "seed", "patches", "choice"]
@@ -104,6 +100,36 @@ def test_how_near_samplers_come_is_what_the_runs_say() -> None:
         difference = paired_difference(base, error[run].dropna().to_dict())
         assert difference is not None
         assert cell == f"{100 * difference.mean:+.1f} % ({difference.n})".replace("-", "−")
+
+
+def test_what_the_references_noise_hides_is_what_the_runs_say() -> None:
+    folder, run = ROOT / "docs/exploration-ceiling", ["method", "scene", "seed"]
+    runs = pd.read_csv(folder / "without_noise.csv")
+    by_budget = {budget: of_it.set_index(run) for budget, of_it in runs.groupby("budget")}
+    hour, scarce = (pd.read_csv(folder / f"{name}.csv") for name in ("hour_h200", "scarce_chains"))
+    tenth = hour.groupby(run).nth(9).set_index(run)
+    scarce = scarce.groupby(run).last()
+    for each in (tenth, scarce):
+        each["hard_error"] = geometric_mean(each, "hard")
+        each["uniform_error"] = geometric_mean(each, "uniform")
+    compared = (
+        (by_budget["small"], "ours_uniform", "ours_exploring"),
+        (by_budget["small (sampler comparison)"], "ours", "ours_predicted"),
+        (by_budget["hour (32 samples per pixel)"], "ours_uniform", "ours_exploring"),
+        (by_budget["hour"], "ours_uniform", "ours_exploring"),
+        (tenth, "ours_uniform", "ours_exploring"),
+        (by_budget["scarce (reuse=steady)"], "ours_uniform", "ours_exploring"),
+        (scarce, "ours_uniform", "ours_exploring"),
+    )
+    page, section = "docs/exploration-ceiling/README.md", "What the references' noise hides"
+    for row, (errors, base, other) in zip(rows_of(page, section)[2:9], compared, strict=True):
+        powers = {"hard_error": 1, "uniform_error": 1, "hard_relmse": 0.5, "uniform_relmse": 0.5}
+        measured = [
+            as_shown(paired_difference(error[base].to_dict(), error[other].to_dict()))
+            for error in (errors[column] ** power for column, power in powers.items())
+        ]
+        pairs = measured[0].split("(")[1][:-1]
+        assert row == [pairs, *(each.split(" (")[0] for each in measured)]
 
 
 def test_what_could_be_had_at_a_tenth_is_what_the_runs_say() -> None:

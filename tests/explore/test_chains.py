@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import pytest
 import torch
+from torch import Tensor
 
 from ngi.explore import (
     Always,
@@ -169,15 +170,20 @@ def test_only_a_rule_that_looks_needs_the_current_targets() -> None:
     )
     assert not uniform.needs_current
     state = standing()
-    arguments = (
-        state,
+    proposals, ids, ones = (
         uniform.propose(state, generator(), batch=0),
         torch.arange(3),
-        torch.zeros(3),
         torch.ones(3),
     )
-    moved, _ = uniform.accept(*arguments, generator())
-    assert (moved.position == 0.75).all()
+
+    def moved(chains: MarkovChains, current: float) -> Tensor:
+        targets = torch.full((3,), current)
+        return chains.accept(state, proposals, ids, targets, ones, generator())[0].position
+
+    assert torch.equal(moved(uniform, 0.0), moved(uniform, 1e6))
+    greedy = sampler(Greedy(accept_equal=False))
+    assert greedy.needs_current
+    assert not torch.equal(moved(greedy, 0.0), moved(greedy, 1e6))
 
 
 def test_targets_may_need_gradients_and_be_half_precision() -> None:

@@ -128,6 +128,7 @@ def test_proposals_are_started_before_the_reused_batches_that_follow(tmp_path: P
 def test_late_patches_are_waited_for(tmp_path: Path) -> None:
     renderer = Manual()
     clock = PhaseClock(timer=renderer.timer)
+    clock.start()
     stream = make(tmp_path, policy=HALF, renderer=renderer, clock=clock)
     same = make(tmp_path / "in turn", policy=HALF)
     for late, reference in zip(steps(stream, 40), steps(same, 40), strict=True):

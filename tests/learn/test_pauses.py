@@ -25,7 +25,6 @@ def late(folder: Path) -> tuple[TrainingStream, ManualJob, PhaseClock]:
     for _ in steps(stream, 5):
         pass
     assert not renderer.jobs[-1].done()
-    clock.load_state_dict(PhaseClock().state_dict())
     clock.start()
     return stream, renderer.jobs[-1], clock
 

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from ngi.explore import Loss, Signals, Target
-from ngi.learn import PatchSamples, TargetMap
+from ngi.learn import STREAM, PatchSamples, TargetMap
 from ngi.learn.target_map import map_states
 from ngi.models import L1Dssim, PixelGenerator
 from ngi.patches import Patches
@@ -122,7 +122,7 @@ def test_a_run_does_not_notice_its_map(runs: dict[str, Path]) -> None:
     states = []
     for folder in runs.values():
         checkpoint = torch.load(folder / "last.ckpt", weights_only=True)
-        parts = ("state_dict", "optimizer_states", "ExplorationDataModule", "global_step")
+        parts = ("state_dict", "optimizer_states", STREAM, "global_step")
         states.append({part: checkpoint[part] for part in parts})
     assert_same(*states)
     chains = [read(folder / "chains.bin") for folder in runs.values()]

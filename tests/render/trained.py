@@ -5,6 +5,7 @@ from pathlib import Path
 import pandas as pd
 import torch
 
+from ngi.learn import STREAM
 from tests.learn.command_line import SMALL, run
 
 
@@ -20,5 +21,5 @@ def stored_buffers(folder: Path, *options: str) -> list[str]:
     assert status == 0, output
     assert len(pd.read_csv(folder / "run" / "steps.csv")) == 12
     state = torch.load(folder / "run" / "last.ckpt", weights_only=True)
-    buffers: list[str] = state["ExplorationDataModule"]["store"]["buffers"]
+    buffers: list[str] = state[STREAM]["store"]["buffers"]
     return buffers

@@ -1,5 +1,6 @@
 """A run with a page trains as one without, and the page shows what the run does."""
 
+import shutil
 import socket
 from pathlib import Path
 from time import monotonic, sleep
@@ -10,13 +11,17 @@ import numpy as np
 import pandas as pd
 import pytest
 import torch
+from hydra.utils import instantiate
 
 from ngi.learn import PhaseClock
+from ngi.render import AnalyticRenderer
+from ngi.scene import read_scene
 from ngi.train import train
 from ngi.view import live
 from ngi.view.live import LiveView, axes, live_view
 from ngi.view.page import Page
 from ngi.view.training_figure import Axis, Visited, training_figure
+from tests.config.command_line import composed
 from tests.learn.command_line import run
 from tests.learn.composition import run_config
 from tests.learn.lightning_warnings import IGNORED
@@ -24,6 +29,8 @@ from tests.methods.anf import test_runs as anf
 from tests.methods.cnsr import test_runs as cnsr
 
 pytestmark = IGNORED
+
+BOX = Path(__file__).parents[1] / "render" / "scenes" / "box"
 
 
 def figure(**changed: Any) -> np.ndarray:
@@ -116,18 +123,20 @@ def test_the_page_shows_runs_whose_samples_are_several_images(
     assert places == {"x": 0, "y": 1, "patch x": 10, "patch y": 11}
 
 
-def test_the_axes_are_called_as_components_are(monkeypatch: pytest.MonkeyPatch) -> None:
-    names = ("a.rotation", "a.rotation_2")
-    monkeypatch.setattr(live, "subject", lambda **_: SimpleNamespace(controls=[]))
-    monkeypatch.setattr(live, "Studio", lambda **_: None)
-    monkeypatch.setattr(live, "Page", lambda *_, **__: SimpleNamespace(address="", gui=None))
-    monkeypatch.setattr(live, "TrainingPanel", lambda _, found: found)
-    of_run: Any = SimpleNamespace(folder=SimpleNamespace(path=Path("run")), renderer=None)
-    description: Any = SimpleNamespace(component_names=names)
-    protocol: Any = SimpleNamespace(resolution=8)
-    view = live_view(of_run, scene_name="a", description=description, protocol=protocol, port=0)
-    found: Any = view._panel
-    assert [axis.name for axis in found] == [*names, "patch x", "patch y"]
+def test_two_rotations_of_one_object_are_two_axes(tmp_path: Path) -> None:
+    shutil.copytree(BOX, tmp_path / "box")
+    text = (BOX / "scene.yaml").read_text().split("variables:")[0]
+    turn = "{object: ball, property: rotation, axis: [0, 1, 0], minimum: 0, maximum: 90}"
+    (tmp_path / "box" / "scene.yaml").write_text(f"{text}variables: [{turn}, {turn}]\n")
+    of_run: Any = SimpleNamespace(
+        folder=SimpleNamespace(path=tmp_path),
+        renderer=AnalyticRenderer(dimensions=2, patch_size=16),
+    )
+    protocol = instantiate(composed("evaluation=small").evaluation.evaluator.protocol)
+    description = read_scene(tmp_path / "box")
+    view = live_view(of_run, scene_name="box", description=description, protocol=protocol, port=0)
+    view.close()
+    assert view._panel._across.options == ("ball.rotation", "ball.rotation_2", "patch x", "patch y")
 
 
 class Recorded:

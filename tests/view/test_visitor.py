@@ -1,7 +1,7 @@
 """What a browser tells the page, and what the page shows it; the browser is a stand-in."""
 
 from collections.abc import Callable, Iterator
-from contextlib import nullcontext
+from contextlib import closing, nullcontext
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -105,8 +105,8 @@ def test_a_browser_that_left_while_its_controls_were_made_is_drawn_nothing(
 ) -> None:
     made = studio()
     page = Page(made, subject(), resolution=64, host="127.0.0.1", port=0)
-    page._welcome(browser)  # type: ignore[arg-type]  # which is not among the server's
-    page.close()
+    with closing(page):
+        page._welcome(browser)  # type: ignore[arg-type]  # which is not among the server's
     assert not made.waiting
 
 
