@@ -7,6 +7,9 @@ from analysis.statistics import Estimate, paired_difference
 from tests.docs.pages import ROOT
 from tests.docs.test_figures import geometric_mean
 
+MAP = "exploration_map.csv.gz"
+"""Of every folder with runs of the map."""
+
 
 def rows_of(page: str, section: str) -> list[list[str]]:
     """Cells of the tables in a section, bold or not, without the first of each row."""
@@ -148,6 +151,35 @@ def test_what_could_be_had_at_a_tenth_is_what_the_runs_say() -> None:
             assert difference.half_width is not None
             measured = f"{percent(100 * difference.mean)} % ± {100 * difference.half_width:.0f}"
             assert cell == (measured if share else "")
+
+
+def test_what_weights_leave_of_reuse_by_loss_is_what_the_runs_say() -> None:
+    def base(name: str, sampler: str) -> pd.DataFrame:
+        runs = pd.read_csv(ROOT / f"docs/exploration-ceiling/{name}")
+        setting = "volume == 0.01 and dimensions == 8 and noise == 0 and step == 4000 and reuse"
+        runs = runs.query(setting)
+        return runs[runs["sampler"] == sampler].set_index("seed")
+
+    page = (ROOT / "docs/exploration-ceiling/predicted-losses.md").read_text()
+    said = page.split("**Weighted back to uniform draws little")[1].split("\n")[0]
+    weighted, uniform = base("by_loss/weighted.csv", "uniform"), base(f"long/{MAP}", "uniform")
+    for words, runs in (
+        ("{} % ± {} lower in place of", weighted),
+        ("in place of {} % ± {}, though", base(f"by_loss/{MAP}", "uniform")),
+    ):
+        difference = paired_difference(*(x["error_tail"].to_dict() for x in (uniform, runs)))
+        assert difference is not None
+        assert difference.half_width is not None
+        assert (
+            words.format(*(f"{100 * x:.0f}" for x in (-difference.mean, difference.half_width)))
+            in said
+        )
+    assert f"({weighted['lit'].mean():.3f})" in said
+    eager = base("by_loss/weighted.csv", "eager"), base(f"eager/{MAP}", "eager")
+    for column, digits in (("error_tail", 3), ("error_uniform", 4)):
+        high, low = (runs[column] for runs in eager)
+        assert (high > low).all()
+        assert f"{high.mean():.{digits}f} in place of {low.mean():.{digits}f}" in said
 
 
 def test_what_is_said_of_how_chains_mix_is_what_their_traces_say() -> None:
