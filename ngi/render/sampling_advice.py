@@ -39,8 +39,8 @@ def sampling_advice(scene: VariableScene, materials: list[Material]) -> list[str
     spp = scene.description.samples_per_pixel
     if spp >= DEAR:
         lines.append(
-            f"renderer.samples_per_pixel=32 instead of {spp}: more patches take off more error "
-            "than any choice of few"
+            f"samples per pixel as budget=machine or budget=hour have them instead of {spp}: more "
+            "patches take off more error than any choice of few"
         )
     return [*lines, f"see {PAGE}"]
 

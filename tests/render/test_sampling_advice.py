@@ -90,7 +90,9 @@ def test_smooth_surfaces_make_caustics_of_it(advice, ball, variables, caustics) 
 
 
 def test_where_patches_are_dear_more_of_them_come_first(advice) -> None:
-    assert "samples_per_pixel=32 instead of 24000" in advice(PAINT, samples=24000)
+    assert "as budget=machine or budget=hour have them instead of 24000" in advice(
+        PAINT, samples=24000
+    )
 
 
 def test_a_pilot_run_says_how_concentrated_its_loss_is_and_what_follows() -> None:
