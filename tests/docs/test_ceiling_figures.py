@@ -1,5 +1,7 @@
 """The tables of docs/exploration-ceiling are those of its runs."""
 
+from itertools import product
+
 import pandas as pd
 
 from analysis.ceiling import EVERYWHERE, NO_CHOICE, differences
@@ -51,13 +53,37 @@ def test_what_is_said_of_who_knows_where_the_rare_is_is_what_the_runs_say() -> N
 
 
 def test_the_papers_learner_where_patches_are_dear_is_said_to_be_what_its_runs_say() -> None:
-    runs = pd.read_csv(ROOT / "docs/exploration-ceiling/scarce_paper.csv").set_index("method")
-    ways = (("hard", ""), ("hard", "_worst5"), ("uniform", ""))
-    _, _, *shown = rows_of("docs/exploration-ceiling/scarce.md", "With the paper's learner")
-    for row, (frames, worst) in zip(shown, ways, strict=True):
+    runs = pd.read_csv(ROOT / "docs/exploration-ceiling/scarce_paper.csv")
+    runs = runs[runs["method"] != "constant_resolution"].set_index(["scene", "method"])
+    scenes = sorted(set(runs.index.get_level_values("scene")))
+    quarters = [1, 3, 5, 7]  # of eight evaluations
+    changes: dict[tuple[str, str], dict[str, list[float]]] = {}
+    for frames, worst in (("hard", ""), ("hard", "_worst5"), ("uniform", "")):
         error = geometric_mean(runs, frames, worst)
-        change = 100 * error["active_exploration"].to_numpy() / error["uniform"].to_numpy() - 100
-        assert row == [f"{each:+.1f} %".replace("-", "−") for each in change]
+        changes[frames, worst] = {
+            scene: list(
+                error[scene, "active_exploration"].values / error[scene, "uniform"].values - 1
+            )
+            for scene in scenes
+        }
+    hard, worst, uniform = changes.values()
+    rows = rows_of("docs/exploration-ceiling/scarce.md", "With the paper's learner")
+    of_scenes, pooled = rows[2 : 2 + len(scenes)], rows[4 + len(scenes) :]
+    for scene, row in zip(scenes, of_scenes, strict=True):
+        ends = [runs.loc[(scene, way)].iloc[-1] for way in ("uniform", "active_exploration")]
+        counts = [", ".join(f"{int(end[c]):,}" for end in ends) for c in ("step", "patches_traced")]
+        errors = [geometric_mean(pd.DataFrame([ends[0]]), f).iloc[0] for f in ("hard", "uniform")]
+        assert row[:3] == [*counts, " / ".join(f"{error:.4f}" for error in errors)]
+        assert row[3] == ", ".join(tenths(hard[scene][i]) for i in quarters)
+        assert row[4:] == [tenths(way[scene][-1]) for way in (worst, uniform)]
+    for row, way in zip(pooled, (hard, worst, uniform), strict=True):
+        base = dict.fromkeys(scenes, 1.0)
+        at = ({scene: 1 + way[scene][i] for scene in scenes} for i in quarters)
+        assert row == [as_shown(paired_difference(base, each)).split(" %")[0] for each in at]
+
+
+def tenths(change: float) -> str:
+    return f"{100 * change:+.1f}".replace("-", "−")
 
 
 def as_shown(difference: Estimate | None) -> str:
@@ -94,15 +120,12 @@ def test_how_near_samplers_come_is_what_the_runs_say() -> None:
     ):
         assert cell == as_shown(paired_difference(error[base].to_dict(), error[other].to_dict()))
 
-    runs = pd.read_csv(folder / "quarter_hour.csv").set_index(
-        ["scene", "seed", "patches", "choice"]
-    )
-    error = runs["hard_error"].unstack(["patches", "choice"])
-    base = error[1792, "uniform"].to_dict()
+    runs = pd.read_csv(folder / "quarter_hour.csv").set_index(["scene", "seed"])
+    error = {
+        run: of_it["hard_error"].to_dict() for run, of_it in runs.groupby(["patches", "choice"])
+    }
     for cell, run in zip(quarter, ((4096, "uniform"), (1792, "oracle")), strict=False):
-        difference = paired_difference(base, error[run].dropna().to_dict())
-        assert difference is not None
-        assert cell == f"{100 * difference.mean:+.1f} % ({difference.n})".replace("-", "−")
+        assert cell == as_shown(paired_difference(error[1792, "uniform"], error[run]))
 
 
 def test_what_the_references_noise_hides_is_what_the_runs_say() -> None:
@@ -204,16 +227,18 @@ def percent(number: float) -> str:
 
 
 def test_what_could_be_gained_in_a_quarter_of_an_hour_is_what_the_runs_say() -> None:
-    runs = pd.read_csv(ROOT / "docs/exploration-ceiling/quarter_hour.csv")
-    runs = runs.set_index(["patches", "choice", "seed"]).sort_index()
-    shown = rows_of("docs/exploration-ceiling/README.md", "A quarter of an hour")[2:5]
+    every = pd.read_csv(ROOT / "docs/exploration-ceiling/quarter_hour.csv")
+    every = every.set_index(["scene", "patches", "choice", "seed"]).sort_index()
+    shown = rows_of("docs/exploration-ceiling/README.md", "A quarter of an hour")[2:8]
     columns = {"error": (1, 4), "tail": (1, 4), "relmse": (0.5, 3)}  # root and decimals
-    for row, (column, (power, digits)) in zip(shown, columns.items(), strict=True):
+    cases = product(("living-room", "veach-egg"), columns.items())
+    for row, (scene, (column, (power, digits))) in zip(shown, cases, strict=True):
+        runs = every.loc[scene]
         errors = runs[[f"{frames}_{column}" for frames in ("hard", "uniform")]] ** power
         base = errors.loc[1792, "uniform"]
         numbers = [" / ".join(f"{error:.{digits}f}" for error in of_one) for of_one in base.values]
-        assert row[0] == "; ".join(numbers)
-        for cell, run in zip(row[1:], ((1792, "oracle"), (4096, "uniform")), strict=True):
+        assert row[1] == "; ".join(numbers)
+        for cell, run in zip(row[2:], ((1792, "oracle"), (4096, "uniform")), strict=True):
             changes = 100 * (errors.loc[run] / base).dropna() - 100
-            numbers = [" / ".join(f"{each:.1f}" for each in of_one) for of_one in changes.values]
-            assert cell == f"{'; '.join(numbers)} %".replace("-", "−")
+            numbers = [" / ".join(f"{each:+.1f}" for each in of_one) for of_one in changes.values]
+            assert cell == "; ".join(numbers).replace("-", "−")
