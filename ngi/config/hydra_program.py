@@ -42,7 +42,8 @@ def completed(words: Sequence[str]) -> list[str]:
         for word in words
         if "=" in word and not word.startswith("-")
     }
-    methods = re.split(r"[\s,]+", named.get("method", "ours").strip())
+    swept = re.sub(r"^choice\((.*)\)$", r"\1", named.get("method", "ours").strip())
+    methods = re.split(r"[\s,]+", swept.strip())
     of_others = not all(re.fullmatch(r"ours(_\w+)?(/\w+)?", method) for method in methods)
     elsewhere = of_others or any(group in named for group in CHOOSING)
     if named.get("budget", "machine") != "machine" or elsewhere:

@@ -18,6 +18,11 @@ from tests.learn.command_line import run
         ("budget=machine", "method=ours budget=machine"),
         ("method=ours_eager", "budget=machine method=ours_eager"),
         ("-m method=ours,ours_without/muon", "-m budget=machine method=ours,ours_without/muon"),
+        (
+            "-m method=choice(ours,ours_eager)",
+            "-m budget=machine method=choice(ours,ours_eager)",
+        ),
+        ("-m method=choice(ours,uniform)", "-m method=choice(ours,uniform)"),
         ("budget=machine method=uniform", "budget=machine method=uniform"),
     ],
 )
