@@ -14,7 +14,6 @@ import json
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 
@@ -25,14 +24,9 @@ from analysis.readme_table import between_markers, markdown_row
 from analysis.runs import METRICS
 
 RESULTS = Path("docs/learner/results.csv")
-BEGIN, END = "<!-- learner: written by analysis.learner_table -->", "<!-- end of learner -->"
-
 ABLATION = Path("docs/learner/ablation.csv")
-OF_PARTS = ("<!-- parts: written by analysis.learner_table -->", "<!-- end of parts -->")
 MINUTE = Path("docs/learner/minute.csv")
-OF_MINUTE = ("<!-- minute: written by analysis.learner_table -->", "<!-- end of minute -->")
 FRAMES = Path("docs/learner/frames.json")
-OF_FRAMES = ("<!-- frames: written by analysis.learner_table -->", "<!-- end of frames -->")
 
 METHODS = {
     "ours": "ours",
@@ -48,11 +42,12 @@ VARIANTS = {
 }
 """What ours of other results is called here: its file and its column, beside `METHODS`."""
 
+PAGE = Path("docs/learner/README.md")
 PAGES = {
     Path("README.md"): (("mape", "dssim"), list(METHODS)[:3]),
-    Path("docs/learner/README.md"): (("mape", "dssim", "mae", "lpips"), list(METHODS)),
+    PAGE: (METRICS, list(METHODS)),
 }
-"""Metrics and methods that each page shows."""
+"""Metrics and methods that each page shows; `PAGE` has all other tables, too."""
 
 
 def learner_table(results: pd.DataFrame, metrics: Sequence[str], methods: Sequence[str]) -> str:
@@ -77,40 +72,21 @@ def learner_table(results: pd.DataFrame, metrics: Sequence[str], methods: Sequen
     return "\n".join(lines)
 
 
-def written(page: str, results: pd.DataFrame, of: Path) -> str:
-    """The page with its table. Raises ValueError where its markers are missing."""
-    metrics, methods = PAGES[of]
-    table = learner_table(results, metrics, methods)
-    return between_markers(page, table, begin=BEGIN, end=END)
-
-
-def with_parts(page: str, results: pd.DataFrame) -> str:
-    """The page with its table of parts. Raises ValueError where its markers are missing."""
-    begin, end = OF_PARTS
-    return between_markers(page, parts_table(results), begin=begin, end=end)
-
-
-def with_minute(page: str, results: pd.DataFrame) -> str:
-    """The page with the table of a minute's training.
-
-    Raises ValueError where its markers are missing, or a scene has no results of a method.
-    """
+def minute_table(results: pd.DataFrame) -> str:
+    """Of a minute's training. Raises ValueError where a scene has no results of a method."""
     methods = list(METHODS)[:3]
     trained = results.groupby("scene")["method"].agg(set)
     for scene, there in trained.items():
         if missing := [method for method in methods if method not in there]:
             raise ValueError(f"{MINUTE}: '{scene}' has no results of {', '.join(missing)}")
-    begin, end = OF_MINUTE
-    table = learner_table(results, METRICS, methods)
-    return between_markers(page, table, begin=begin, end=end)
+    return learner_table(results, METRICS, methods)
 
 
-def with_variant(page: str, results: pd.DataFrame, variant: pd.DataFrame, name: str) -> str:
-    """The page with a table of ours, of a variant of it, and of the denoiser.
+def variant_table(results: pd.DataFrame, variant: pd.DataFrame, name: str) -> str:
+    """Of ours, of a variant of it, and of the denoiser.
 
     variant: a report's table of one method; name: in `VARIANTS`
-    Raises ValueError where the table's markers are missing, and where the variant has another
-    scene or other seeds than ours.
+    Raises ValueError where the variant has another scene or other seeds than ours.
     """
     runs = variant.dropna(subset="seeds").assign(method=name)  # not the references' noise
     seeds = results[results["method"] == "ours"].set_index("scene")["seeds"]
@@ -120,17 +96,29 @@ def with_variant(page: str, results: pd.DataFrame, variant: pd.DataFrame, name: 
                 f"{VARIANTS[name][0]}: '{scene}' has seeds {of_variant}, in {RESULTS} "
                 f"{seeds.get(scene)}"
             )
-    table = learner_table(
-        pd.concat([results, runs]), METRICS, ["ours", name, "path_tracing_oidn_8spp"]
-    )
-    begin = f"<!-- {name}: written by analysis.learner_table -->"
-    return between_markers(page, table, begin=begin, end=f"<!-- end of {name} -->")
+    methods = ["ours", name, "path_tracing_oidn_8spp"]
+    return learner_table(pd.concat([results, runs]), METRICS, methods)
 
 
-def with_frames(page: str, benchmark: Mapping[str, Any]) -> str:
-    """The page with its table of frames. Raises ValueError where its markers are missing."""
-    begin, end = OF_FRAMES
-    return between_markers(page, frames_table(benchmark["figures"]), begin=begin, end=end)
+def tables(page: Path) -> dict[str, str]:
+    """All that is written into a page of `PAGES`, by the name in the markers."""
+    results = pd.read_csv(RESULTS)
+    found = {"learner": learner_table(results, *PAGES[page])}
+    if page == PAGE:
+        found["frames"] = frames_table(json.loads(FRAMES.read_text())["figures"])
+        for name, (file, _) in VARIANTS.items():
+            found[name] = variant_table(results, pd.read_csv(file), name)
+        found["minute"] = minute_table(pd.read_csv(MINUTE))
+        found["parts"] = parts_table(pd.read_csv(ABLATION))
+    return found
+
+
+def with_tables(text: str, tables: Mapping[str, str]) -> str:
+    """A page's text with its tables. Raises ValueError where the markers of one are missing."""
+    for name, table in tables.items():
+        begin = f"<!-- {name}: written by analysis.learner_table -->"
+        text = between_markers(text, table, begin=begin, end=f"<!-- end of {name} -->")
+    return text
 
 
 @errors_in_a_line
@@ -139,15 +127,8 @@ def main() -> int:
     argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     ).parse_args()
-    results = pd.read_csv(RESULTS)
     for page in PAGES:
-        page.write_text(written(page.read_text(), results, page))
-    page = Path("docs/learner/README.md")
-    text = with_parts(page.read_text(), pd.read_csv(ABLATION))
-    text = with_minute(text, pd.read_csv(MINUTE))
-    for name, (file, _) in VARIANTS.items():
-        text = with_variant(text, results, pd.read_csv(file), name)
-    page.write_text(with_frames(text, json.loads(FRAMES.read_text())))
+        page.write_text(with_tables(page.read_text(), tables(page)))
     return 0
 
 

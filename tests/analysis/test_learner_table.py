@@ -1,6 +1,5 @@
 """README.md and docs/learner show the numbers of docs/learner/results.csv."""
 
-import json
 from pathlib import Path
 
 import pandas as pd
@@ -8,21 +7,13 @@ import pytest
 import yaml
 
 from analysis.learner_table import (
-    ABLATION,
-    BEGIN,
-    END,
-    FRAMES,
     MINUTE,
-    OF_MINUTE,
     PAGES,
-    RESULTS,
-    VARIANTS,
     learner_table,
-    with_frames,
-    with_minute,
-    with_parts,
-    with_variant,
-    written,
+    minute_table,
+    tables,
+    variant_table,
+    with_tables,
 )
 from analysis.parts_of_frames import frames_table
 from analysis.runs import METRICS
@@ -30,28 +21,16 @@ from analysis.runs import METRICS
 ROOT = Path(__file__).resolve().parents[2]
 
 
-@pytest.mark.parametrize("page", PAGES, ids=str)
-def test_the_pages_have_the_numbers_of_the_results(page: Path) -> None:
-    text = (ROOT / page).read_text()
-    assert text == written(text, pd.read_csv(ROOT / RESULTS), page), (
-        "python -m analysis.learner_table writes it"
-    )
-
-
-def test_the_page_has_the_numbers_of_the_ablation() -> None:
-    text = (ROOT / "docs/learner/README.md").read_text()
-    assert text == with_parts(text, pd.read_csv(ROOT / ABLATION)), (
-        "python -m analysis.learner_table writes it"
-    )
-
-
-@pytest.mark.parametrize("name", VARIANTS)
-def test_the_page_has_the_numbers_of_what_ours_was_varied_in(name: str) -> None:
-    text = (ROOT / "docs/learner/README.md").read_text()
-    results, variant = pd.read_csv(ROOT / RESULTS), pd.read_csv(ROOT / VARIANTS[name][0])
-    assert text == with_variant(text, results, variant, name), (
-        "python -m analysis.learner_table writes it"
-    )
+@pytest.mark.parametrize(
+    ("page", "count"), [(page, count) for page, count in zip(PAGES, (1, 6), strict=True)], ids=str
+)
+def test_the_pages_have_the_numbers_of_the_results(
+    page: Path, count: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(ROOT)
+    text, found = page.read_text(), tables(page)
+    assert len(found) == count
+    assert text == with_tables(text, found), "python -m analysis.learner_table writes it"
 
 
 def test_a_variant_stands_beside_ours() -> None:
@@ -64,27 +43,17 @@ def test_a_variant_stands_beside_ours() -> None:
             {**box, "method": "reference noise", "seeds": None, "hard_mape": 0.01},
         ]
     )
-    begin, end = "<!-- rays: written by analysis.learner_table -->", "<!-- end of rays -->"
-    table = with_variant(f"{begin}\n{end}", results, variant, "rays").splitlines()
-    assert "| ours | ours, 8 rays per pixel | Open Image Denoise, 8" in table[2]
+    table = variant_table(results, variant, "rays").splitlines()
+    assert "| ours | ours, 8 rays per pixel | Open Image Denoise, 8" in table[0]
     same = "0.100 / **0.100** / **0.100** / **0.100**"
-    assert table[4] == f"| box | 2 | {same} | **0.050**{same.removeprefix('0.100')} | {same} |"
+    assert table[2] == f"| box | 2 | {same} | **0.050**{same.removeprefix('0.100')} | {same} |"
     for changed in ({"seeds": "0"}, {"scene": "hall"}):
         with pytest.raises(ValueError, match=r"rays.csv: '(box|hall)' has seeds"):
-            with_variant(f"{begin}\n{end}", results, variant.assign(**changed), "rays")
+            variant_table(results, variant.assign(**changed), "rays")
 
 
-def test_the_page_has_the_times_of_the_benchmark() -> None:
-    text = (ROOT / "docs/learner/README.md").read_text()
-    assert text == with_frames(text, json.loads((ROOT / FRAMES).read_text())), (
-        "python -m analysis.learner_table writes it"
-    )
-
-
-def test_the_page_has_the_numbers_of_every_scene_of_the_minute() -> None:
-    text = (ROOT / "docs/learner/README.md").read_text()
+def test_the_minute_has_every_scene_of_its_sweep() -> None:
     minute = pd.read_csv(ROOT / MINUTE)
-    assert text == with_minute(text, minute), "python -m analysis.learner_table writes it"
     sweep = yaml.safe_load((ROOT / "sweeps/minute.yaml").read_text())
     scenes = sweep["hydra"]["sweeper"]["params"]["scene"].replace(" ", "").split(",")
     assert len(scenes) == 16
@@ -96,10 +65,9 @@ def test_a_scene_that_a_method_has_not_trained_on_is_named() -> None:
     methods = ("ours", "path_tracing_oidn_8spp", "active_exploration")
     rows = [*(("box", method) for method in methods), *(("hall", m) for m in methods[:2])]
     minute = pd.DataFrame([{"scene": s, "method": m, "seeds": 0, **errors} for s, m in rows])
-    page = "\n".join(OF_MINUTE)
-    assert "| box | 1 |" in with_minute(page, minute[:3])
+    assert "| box | 1 |" in minute_table(minute[:3])
     with pytest.raises(ValueError, match="'hall' has no results of active_exploration"):
-        with_minute(page, minute)
+        minute_table(minute)
 
 
 def frame_figure(name: str, median: float, unit: str = "ms", *, part: str = "frames") -> dict:
@@ -143,7 +111,8 @@ def test_the_lowest_error_of_each_metric_is_bold_and_ties_are() -> None:
 
 
 def test_a_page_without_its_place_is_refused() -> None:
-    with pytest.raises(ValueError, match="put the lines"):
-        written("nothing", results(ours=(1, 1)), Path("README.md"))
-    page = f"a\n{BEGIN}\nold\n{END}\nb"
-    assert "old" not in written(page, results(ours=(1, 1)), Path("README.md"))
+    begin, end = "<!-- rays: written by analysis.learner_table -->", "<!-- end of rays -->"
+    page = with_tables(f"a\n{begin}\nold\n{end}\nb", {"rays": "new"})
+    assert page == f"a\n{begin}\n\nnew\n\n{end}\nb"
+    with pytest.raises(ValueError, match="put the lines '<!-- minute: written"):
+        with_tables(page, {"rays": "new", "minute": "new"})
