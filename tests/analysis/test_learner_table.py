@@ -21,9 +21,7 @@ from analysis.runs import METRICS
 ROOT = Path(__file__).resolve().parents[2]
 
 
-@pytest.mark.parametrize(
-    ("page", "count"), [(page, count) for page, count in zip(PAGES, (1, 6), strict=True)], ids=str
-)
+@pytest.mark.parametrize(("page", "count"), list(zip(PAGES, (1, 6), strict=True)), ids=str)
 def test_the_pages_have_the_numbers_of_the_results(
     page: Path, count: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:

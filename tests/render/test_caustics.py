@@ -10,8 +10,8 @@ from ngi.render.first_hit import first_hit_of
 from ngi.render.mitsuba_renderer import MitsubaRenderer
 from ngi.scene import read_scene
 from ngi.scene.variable_scene import VariableScene
-from ngi.studies.benchmark.measure import counted_kernels
 from tests.render.optics import ORIGIN, dot, fresnel, on_plane, rays, rectangle, unit, write_scene
+from tests.render.seedless import seedless_buffers
 from tests.render.test_direct_light import (
     ALBEDO,
     BULB,
@@ -146,19 +146,7 @@ value="30, 20, 10"/></emitter></shape>'
 def test_there_is_no_seed_and_patches_show_the_image(load) -> None:
     turns = "{object: block, property: translation, minimum: [0, 0, 0], maximum: [1, 0, 0]}"
     renderer = load(FLOOR + BULB + BLOCK.format(x=1.5), variables=[turns, DIM])
-    renderer.warm_up()
-    states = torch.rand(4, renderer.dimensions + 2, generator=torch.Generator().manual_seed(0))
-    with counted_kernels() as kernels:
-        first = renderer.render_patches(states, resolution=24, seed=1).buffers
-        second = renderer.render_patches(states.flip(0), resolution=24, seed=2).buffers.flip(0)
-    assert kernels.compiled == 0
-    assert torch.equal(first, second)
-    for state, patch in zip(states, first, strict=True):
-        column, row = (min(int(p * 17), 16) for p in state[-2:].tolist())
-        image = renderer.image_buffers(state[:-2], resolution=24)
-        torch.testing.assert_close(
-            patch, image[row : row + 8, column : column + 8], atol=1e-5, rtol=0
-        )
+    seedless_buffers(renderer)
 
 
 WITHOUT = {

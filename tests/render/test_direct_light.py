@@ -11,8 +11,8 @@ from ngi.render.direct_light import light_points
 from ngi.render.mitsuba_renderer import MitsubaRenderer
 from ngi.render.tracing import subpixel_points
 from ngi.scene import read_scene
-from ngi.studies.benchmark.measure import counted_kernels
 from tests.render.optics import ORIGIN, on_plane, rays, rectangle, unit, write_scene
+from tests.render.seedless import seedless_buffers
 from tests.render.trained import stored_buffers
 
 RESOLUTION = 16
@@ -145,19 +145,7 @@ def test_it_depends_on_no_seed_and_patches_show_the_image(load, backend) -> None
     )  # fmt: skip
     moves = "{object: floor, property: translation, minimum: [0, 0, 0], maximum: [0, 0, 0.5]}"
     renderer = load(shapes, backend=backend, variables=[moves, PAINT], buffer_samples=2)
-    renderer.warm_up()
-    states = torch.rand(4, renderer.dimensions + 2, generator=torch.Generator().manual_seed(0))
-    with counted_kernels() as kernels:
-        first = renderer.render_patches(states, resolution=24, seed=1).buffers
-        second = renderer.render_patches(states.flip(0), resolution=24, seed=2).buffers.flip(0)
-    assert kernels.compiled == 0
-    assert torch.equal(first, second)
-    for state, patch in zip(states, first, strict=True):
-        column, row = (min(int(p * 17), 16) for p in state[-2:].tolist())
-        image = renderer.image_buffers(state[:-2], resolution=24)
-        torch.testing.assert_close(
-            patch, image[row : row + 8, column : column + 8], atol=1e-5, rtol=0
-        )
+    first = seedless_buffers(renderer)
     assert first[..., renderer.layout.slice("direct")].std() > 0.01
 
 
