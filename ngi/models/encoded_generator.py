@@ -6,6 +6,7 @@ from torch import Tensor, nn
 from ngi.models.generator_inputs import check_inputs, check_sizes
 from ngi.models.known_light import add_known_light
 from ngi.models.parallel import in_parallel
+from ngi.models.patch_linear import product_precision
 from ngi.models.pixel_encoding import PixelEncoding
 from ngi.models.pixel_generator import CACHED_PIXELS, MANY_PIXELS, RADIANCE_CHANNELS
 from ngi.models.pixel_mlp import PixelMLP
@@ -68,7 +69,7 @@ class EncodedGenerator(nn.Module):
         check_inputs(
             buffers, scene_vector, layout=self.layout, scene_dimensions=self.scene_dimensions
         )
-        pixels, precision = buffers.flatten(1, 2), _precision(buffers)
+        pixels, precision = buffers.flatten(1, 2), product_precision(buffers)
         with torch.autocast(pixels.device.type, enabled=False):
             encoded = self.encoding(pixels, scene_vector, precision)
             output: Tensor = self.mlp(encoded, scene_vector)
@@ -84,7 +85,7 @@ class EncodedGenerator(nn.Module):
             layout=self.layout,
             scene_dimensions=self.scene_dimensions,
         )
-        precision, pixels = _precision(buffers), buffers.flatten(0, 1)
+        precision, pixels = product_precision(buffers), buffers.flatten(0, 1)
 
         def output_of(chunk: Tensor) -> Tensor:
             encoded = self.encoding(chunk[None], scene_vector[None], precision)[0]
@@ -97,11 +98,3 @@ class EncodedGenerator(nn.Module):
             else:
                 output = torch.cat([output_of(chunk) for chunk in pixels.split(MANY_PIXELS)])
         return add_known_light(output.unflatten(0, buffers.shape[:2]), buffers, self.layout)
-
-
-def _precision(pixels: Tensor) -> torch.dtype:
-    """Of the products: autocast's where it is on."""
-    device = pixels.device.type
-    if torch.is_autocast_enabled(device) and pixels.dtype == torch.float32:
-        return torch.get_autocast_dtype(device)
-    return pixels.dtype

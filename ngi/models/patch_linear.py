@@ -129,11 +129,19 @@ def _widths(scene_vector: Tensor, pixels: Sequence[Tensor]) -> list[int]:
 
 def _linear(x: Tensor, weight: Tensor) -> Tensor:
     """Product x · weightᵀ; under autocast, float32 x enters as the sum of two numbers."""
-    device = x.device.type
-    if torch.is_autocast_enabled(device) and x.dtype == torch.float32:
-        terms = in_precision(x, torch.get_autocast_dtype(device))
+    precision = product_precision(x)
+    if precision != x.dtype:
+        terms = in_precision(x, precision)
         return F.linear(torch.cat(terms, dim=-1), torch.cat([weight, weight], dim=1))
     return F.linear(x, weight)
+
+
+def product_precision(x: Tensor) -> torch.dtype:
+    """Of products with x: autocast's where it is on and x is float32, else x's own."""
+    device = x.device.type
+    if torch.is_autocast_enabled(device) and x.dtype == torch.float32:
+        return torch.get_autocast_dtype(device)
+    return x.dtype
 
 
 def in_precision(x: Tensor, dtype: torch.dtype) -> list[Tensor]:

@@ -9,7 +9,7 @@ from torch import Tensor, nn
 from ngi.models.generator_inputs import check_inputs, check_sizes
 from ngi.models.image_layers import ImageLinear, layer_inputs
 from ngi.models.known_light import add_known_light
-from ngi.models.patch_linear import PatchLinear
+from ngi.models.patch_linear import PatchLinear, product_precision
 from ngi.patches import BufferLayout
 
 RADIANCE_CHANNELS = 3
@@ -118,10 +118,7 @@ class PixelGenerator(nn.Module):
             layout=self.layout,
             scene_dimensions=self.scene_dimensions,
         )
-        device = buffers.device.type
-        precision = self.input_layer.weight.dtype
-        if torch.is_autocast_enabled(device) and precision == torch.float32:
-            precision = torch.get_autocast_dtype(device)
+        device, precision = buffers.device.type, product_precision(self.input_layer.weight)
         size = CACHED_PIXELS if device == "cpu" else MANY_PIXELS
         with torch.autocast(device, enabled=False):
             layers = [
