@@ -68,7 +68,7 @@ def test_the_papers_learner_where_patches_are_dear_is_said_to_be_what_its_runs_s
         }
     hard, worst, uniform = changes.values()
     rows = rows_of("docs/exploration-ceiling/scarce.md", "With the paper's learner")
-    of_scenes, pooled = rows[2 : 2 + len(scenes)], rows[4 + len(scenes) :]
+    of_scenes, pooled = rows[2 : 2 + len(scenes)], rows[4 + len(scenes) : 7 + len(scenes)]
     for scene, row in zip(scenes, of_scenes, strict=True):
         ends = [runs.loc[(scene, way)].iloc[-1] for way in ("uniform", "active_exploration")]
         counts = [", ".join(f"{int(end[c]):,}" for end in ends) for c in ("step", "patches_traced")]
@@ -80,6 +80,35 @@ def test_the_papers_learner_where_patches_are_dear_is_said_to_be_what_its_runs_s
         base = dict.fromkeys(scenes, 1.0)
         at = ({scene: 1 + way[scene][i] for scene in scenes} for i in quarters)
         assert row == [as_shown(paired_difference(base, each)).split(" %")[0] for each in at]
+
+
+def test_exploring_at_constant_resolution_is_what_its_runs_say() -> None:
+    runs = pd.read_csv(ROOT / "docs/exploration-ceiling/scarce_paper.csv")
+    runs = runs.set_index(["scene", "method"]).sort_index()
+    method = runs.index.get_level_values("method")
+    scenes = sorted(runs[method == "constant_resolution"].index.get_level_values("scene").unique())
+    shown = rows_of("docs/exploration-ceiling/scarce.md", "With the paper's learner")[-4:]
+    changes = {
+        frames: pd.DataFrame(
+            {
+                scene: geometric_mean(runs.loc[(scene, "constant_resolution")], frames).values[1::2]
+                / geometric_mean(runs.loc[(scene, "uniform")], frames).values[1::2]
+                - 1
+                for scene in scenes
+            }
+        )
+        for frames in ("hard", "uniform")
+    }
+    for scene, row in zip(scenes, shown, strict=False):
+        assert row[2:] == [", ".join(map(tenths, change[scene])) for change in changes.values()]
+    base = dict.fromkeys(scenes, 1.0)
+    assert shown[-1][2:] == [
+        ", ".join(
+            as_shown(paired_difference(base, (1 + row).to_dict())).split(" %")[0]
+            for _, row in change.iterrows()
+        )
+        for change in changes.values()
+    ]
 
 
 def tenths(change: float) -> str:
