@@ -52,72 +52,70 @@ def test_what_is_said_of_who_knows_where_the_rare_is_is_what_the_runs_say() -> N
         assert cell == f"{errors}: {', '.join(map(percent, change))} %"
 
 
-def test_the_papers_learner_where_patches_are_dear_is_said_to_be_what_its_runs_say() -> None:
+LEARNER = "With the paper's learner"
+
+
+def papers_runs() -> pd.DataFrame:
     runs = pd.read_csv(ROOT / "docs/exploration-ceiling/scarce_paper.csv")
-    runs = runs[runs["method"] != "constant_resolution"].set_index(["scene", "method"])
-    scenes = sorted(set(runs.index.get_level_values("scene")))
-    quarters = [1, 3, 5, 7]  # of eight evaluations
-    changes: dict[tuple[str, str], dict[str, list[float]]] = {}
-    for frames, worst in (("hard", ""), ("hard", "_worst5"), ("uniform", "")):
-        error = geometric_mean(runs, frames, worst)
-        changes[frames, worst] = {
-            scene: list(
-                error[scene, "active_exploration"].values / error[scene, "uniform"].values - 1
-            )
-            for scene in scenes
+    return runs.set_index(["method", "scene"]).sort_index()
+
+
+def by_quarter(runs: pd.DataFrame, method: str, frames: str, worst: str = "") -> pd.DataFrame:
+    """[4, scenes] relative changes to uniform sampling at every second of eight evaluations."""
+    error = geometric_mean(runs, frames, worst)
+    return pd.DataFrame(
+        {
+            scene: error[method, scene].values[1::2] / error["uniform", scene].values[1::2] - 1
+            for scene in runs.loc[method].index.unique()
         }
-    hard, worst, uniform = changes.values()
-    rows = rows_of("docs/exploration-ceiling/scarce.md", "With the paper's learner")
-    of_scenes, pooled = rows[2 : 2 + len(scenes)], rows[4 + len(scenes) : 7 + len(scenes)]
+    )
+
+
+def pooled(changes: pd.DataFrame) -> list[str]:
+    """At every quarter, over the scenes, as the tables have it."""
+    means = (difference_of(0 * change + 1, change + 1) for _, change in changes.iterrows())
+    return [as_shown(mean).split(" %")[0] for mean in means]
+
+
+def test_the_papers_learner_where_patches_are_dear_is_said_to_be_what_its_runs_say() -> None:
+    runs = papers_runs()
+    ways = (("hard", ""), ("hard", "_worst5"), ("uniform", ""))
+    hard, worst, uniform = (by_quarter(runs, "active_exploration", *way) for way in ways)
+    scenes = list(hard)
+    rows = rows_of("docs/exploration-ceiling/scarce.md", LEARNER)
+    of_scenes, of_all = rows[2 : 2 + len(scenes)], rows[4 + len(scenes) : 7 + len(scenes)]
     for scene, row in zip(scenes, of_scenes, strict=True):
-        ends = [runs.loc[(scene, way)].iloc[-1] for way in ("uniform", "active_exploration")]
+        ends = [runs.loc[(way, scene)].iloc[-1] for way in ("uniform", "active_exploration")]
         counts = [", ".join(f"{int(end[c]):,}" for end in ends) for c in ("step", "patches_traced")]
         errors = [geometric_mean(pd.DataFrame([ends[0]]), f).iloc[0] for f in ("hard", "uniform")]
         assert row[:3] == [*counts, " / ".join(f"{error:.4f}" for error in errors)]
-        assert row[3] == ", ".join(tenths(hard[scene][i]) for i in quarters)
-        assert row[4:] == [tenths(way[scene][-1]) for way in (worst, uniform)]
-    for row, way in zip(pooled, (hard, worst, uniform), strict=True):
-        base = dict.fromkeys(scenes, 1.0)
-        at = ({scene: 1 + way[scene][i] for scene in scenes} for i in quarters)
-        assert row == [as_shown(paired_difference(base, each)).split(" %")[0] for each in at]
+        assert row[3] == ", ".join(map(tenths, hard[scene]))
+        assert row[4:] == [tenths(way[scene].iloc[-1]) for way in (worst, uniform)]
+    assert of_all == [pooled(way) for way in (hard, worst, uniform)]
 
 
 def test_exploring_at_constant_resolution_is_what_its_runs_say() -> None:
-    runs = pd.read_csv(ROOT / "docs/exploration-ceiling/scarce_paper.csv")
-    runs = runs.set_index(["scene", "method"]).sort_index()
-    method = runs.index.get_level_values("method")
-    scenes = sorted(runs[method == "constant_resolution"].index.get_level_values("scene").unique())
-    shown = rows_of("docs/exploration-ceiling/scarce.md", "With the paper's learner")[-4:]
-    changes = {
-        frames: pd.DataFrame(
-            {
-                scene: geometric_mean(runs.loc[(scene, "constant_resolution")], frames).values[1::2]
-                / geometric_mean(runs.loc[(scene, "uniform")], frames).values[1::2]
-                - 1
-                for scene in scenes
-            }
-        )
-        for frames in ("hard", "uniform")
-    }
-    for scene, row in zip(scenes, shown, strict=False):
-        assert row[2:] == [", ".join(map(tenths, change[scene])) for change in changes.values()]
-    base = dict.fromkeys(scenes, 1.0)
-    assert shown[-1][2:] == [
-        ", ".join(
-            as_shown(paired_difference(base, (1 + row).to_dict())).split(" %")[0]
-            for _, row in change.iterrows()
-        )
-        for change in changes.values()
-    ]
+    runs = papers_runs()
+    ways = [by_quarter(runs, "constant_resolution", frames) for frames in ("hard", "uniform")]
+    *of_scenes, of_all = rows_of("docs/exploration-ceiling/scarce.md", LEARNER)[-4:]
+    for scene, row in zip(ways[0], of_scenes, strict=True):
+        assert row[2:] == [", ".join(map(tenths, way[scene])) for way in ways]
+    assert of_all[2:] == [", ".join(pooled(way)) for way in ways]
+
+
+def difference_of(base: pd.Series, other: pd.Series) -> Estimate:
+    """Of `other` to `base`, paired by their index."""
+    difference = paired_difference(base.to_dict(), other.to_dict())
+    assert difference is not None
+    return difference
 
 
 def tenths(change: float) -> str:
     return f"{100 * change:+.1f}".replace("-", "−")
 
 
-def as_shown(difference: Estimate | None) -> str:
+def as_shown(difference: Estimate) -> str:
     """As the tables have it: '+3.0 ± 1.1 % (21)', and without ± where there is one pair."""
-    assert difference is not None
     interval = "" if difference.half_width is None else f" ± {100 * difference.half_width:.1f}"
     mean = f"{100 * difference.mean:+.1f}".replace("-0.0", "0.0")
     text = f"{mean}{interval} % ({difference.n})"
@@ -147,14 +145,12 @@ def test_how_near_samplers_come_is_what_the_runs_say() -> None:
         (small[3], chains["hard_error"], "ours_uniform", "ours_exploring"),
         (scarce[3], geometric_mean(scarce_runs, "hard"), "ours_uniform", "ours_exploring"),
     ):
-        assert cell == as_shown(paired_difference(error[base].to_dict(), error[other].to_dict()))
+        assert cell == as_shown(difference_of(error[base], error[other]))
 
     runs = pd.read_csv(folder / "quarter_hour.csv").set_index(["scene", "seed"])
-    error = {
-        run: of_it["hard_error"].to_dict() for run, of_it in runs.groupby(["patches", "choice"])
-    }
+    error = {run: of_it["hard_error"] for run, of_it in runs.groupby(["patches", "choice"])}
     for cell, run in zip(quarter, ((4096, "uniform"), (1792, "oracle")), strict=False):
-        assert cell == as_shown(paired_difference(error[1792, "uniform"], error[run]))
+        assert cell == as_shown(difference_of(error[1792, "uniform"], error[run]))
 
 
 def test_what_the_references_noise_hides_is_what_the_runs_say() -> None:
@@ -180,7 +176,7 @@ def test_what_the_references_noise_hides_is_what_the_runs_say() -> None:
     for row, (errors, base, other) in zip(rows_of(page, section)[2:9], compared, strict=True):
         powers = {"hard_error": 1, "uniform_error": 1, "hard_relmse": 0.5, "uniform_relmse": 0.5}
         measured = [
-            as_shown(paired_difference(error[base].to_dict(), error[other].to_dict()))
+            as_shown(difference_of(error[base], error[other]))
             for error in (errors[column] ** power for column, power in powers.items())
         ]
         pairs = measured[0].split("(")[1][:-1]
@@ -198,8 +194,7 @@ def test_what_could_be_had_at_a_tenth_is_what_the_runs_say() -> None:
         cells = [cell.strip() for cell in line.split("|")[2:-1]]
         assert cells[:2] == [f"{here['lit'].mean():.3f}", f"{here['error_tail'].mean():.3f}"]
         for cell, name in zip(cells[2:], ("error_tail", "error_uniform"), strict=True):
-            difference = paired_difference(uniform[name].to_dict(), here[name].to_dict())
-            assert difference is not None
+            difference = difference_of(uniform[name], here[name])
             assert difference.half_width is not None
             measured = f"{percent(100 * difference.mean)} % ± {100 * difference.half_width:.0f}"
             assert cell == (measured if share else "")
@@ -219,8 +214,7 @@ def test_what_weights_leave_of_reuse_by_loss_is_what_the_runs_say() -> None:
         ("{} % ± {} lower in place of", weighted),
         ("in place of {} % ± {}, though", base(f"by_loss/{MAP}", "uniform")),
     ):
-        difference = paired_difference(*(x["error_tail"].to_dict() for x in (uniform, runs)))
-        assert difference is not None
+        difference = difference_of(uniform["error_tail"], runs["error_tail"])
         assert difference.half_width is not None
         assert (
             words.format(*(f"{100 * x:.0f}" for x in (-difference.mean, difference.half_width)))

@@ -7,11 +7,11 @@ from ngi.render.mitsuba_renderer import MitsubaRenderer
 from ngi.studies.benchmark.measure import counted_kernels
 
 
-def seedless_buffers(renderer: MitsubaRenderer) -> Tensor:
-    """Those of four patches of 8 × 8, [4, 8, 8, C].
+def assert_seedless(renderer: MitsubaRenderer) -> Tensor:
+    """Asserts that buffers depend on no seed and no order, and that patches show the image.
 
-    Asserts that they depend on no seed and on no order, that no kernel is compiled once the
-    renderer is warm, and that patches show what the image shows.
+    Nor is a kernel compiled once the renderer is warm. Gives the buffers of four patches of 8 × 8,
+    [4, 8, 8, C].
     """
     renderer.warm_up()
     states = torch.rand(4, renderer.dimensions + 2, generator=torch.Generator().manual_seed(0))

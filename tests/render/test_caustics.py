@@ -11,7 +11,7 @@ from ngi.render.mitsuba_renderer import MitsubaRenderer
 from ngi.scene import read_scene
 from ngi.scene.variable_scene import VariableScene
 from tests.render.optics import ORIGIN, dot, fresnel, on_plane, rays, rectangle, unit, write_scene
-from tests.render.seedless import seedless_buffers
+from tests.render.seedless import assert_seedless
 from tests.render.test_direct_light import (
     ALBEDO,
     BULB,
@@ -146,7 +146,7 @@ value="30, 20, 10"/></emitter></shape>'
 def test_there_is_no_seed_and_patches_show_the_image(load) -> None:
     turns = "{object: block, property: translation, minimum: [0, 0, 0], maximum: [1, 0, 0]}"
     renderer = load(FLOOR + BULB + BLOCK.format(x=1.5), variables=[turns, DIM])
-    seedless_buffers(renderer)
+    assert_seedless(renderer)
 
 
 WITHOUT = {

@@ -12,7 +12,7 @@ from ngi.render.mitsuba_renderer import MitsubaRenderer
 from ngi.render.tracing import subpixel_points
 from ngi.scene import read_scene
 from tests.render.optics import ORIGIN, on_plane, rays, rectangle, unit, write_scene
-from tests.render.seedless import seedless_buffers
+from tests.render.seedless import assert_seedless
 from tests.render.trained import stored_buffers
 
 RESOLUTION = 16
@@ -145,7 +145,7 @@ def test_it_depends_on_no_seed_and_patches_show_the_image(load, backend) -> None
     )  # fmt: skip
     moves = "{object: floor, property: translation, minimum: [0, 0, 0], maximum: [0, 0, 0.5]}"
     renderer = load(shapes, backend=backend, variables=[moves, PAINT], buffer_samples=2)
-    first = seedless_buffers(renderer)
+    first = assert_seedless(renderer)
     assert first[..., renderer.layout.slice("direct")].std() > 0.01
 
 
