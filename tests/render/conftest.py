@@ -6,10 +6,9 @@ import pytest
 from ngi.machine.backend import llvm_problem
 from ngi.render.mitsuba_renderer import HalvesRenderer, MitsubaRenderer
 from ngi.scene import read_scene
+from tests.render.box import BOX
 from tests.render.optics import write_scene
 from tests.render.specular_scenes import COLOURS, PAINT
-
-BOX = Path(__file__).parent / "scenes" / "box"
 
 
 @pytest.fixture(params=["llvm", "scalar"])

@@ -2,15 +2,13 @@
 
 import gc
 import weakref
-from pathlib import Path
 
 import pytest
 
 from ngi.machine.backend import llvm_problem
 from ngi.render.mitsuba_renderer import MitsubaRenderer
 from ngi.scene import read_scene
-
-BOX = Path(__file__).parent / "scenes" / "box"
+from tests.render.box import BOX
 
 
 def test_a_renderer_that_only_a_cycle_holds_is_gone_when_the_next_one_is_made() -> None:

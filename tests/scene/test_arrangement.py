@@ -13,8 +13,7 @@ from ngi.scene.kinds import KeyFrames, Material, Shape, Translation, Visibility
 from ngi.scene.loading import load
 from ngi.scene.scene_files import SceneFile
 from ngi.scene.variable_scene import VariableScene
-
-BOX = Path(__file__).parents[1] / "render" / "scenes" / "box"
+from tests.render.box import BOX
 
 XML = """<scene version="3.0.0">
 <emitter type="area" id="light"/>

@@ -10,8 +10,8 @@ import pytest
 
 from ngi.scene import read_scene
 from ngi.scene.yaml_keys import load_yaml
+from tests.render.box import BOX
 
-BOX = Path(__file__).parents[1] / "render" / "scenes" / "box"
 SCENES = sorted(p.parent for p in (Path(__file__).parents[2] / "scenes").glob("*/scene.yaml"))
 
 

@@ -6,8 +6,7 @@ from pathlib import Path
 import pytest
 
 from ngi.scene import KINDS, read_scene
-
-BOX = Path(__file__).parents[1] / "render" / "scenes" / "box"
+from tests.render.box import BOX
 
 RIGHT = {
     "albedo": "minimum: [0, 0, 0], maximum: [1, 1, 1]",

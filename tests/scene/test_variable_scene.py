@@ -9,8 +9,8 @@ import pytest
 from ngi.machine.backend import activate, llvm_problem, mi
 from ngi.scene import read_scene
 from ngi.scene.variable_scene import VariableScene
+from tests.render.box import BOX
 
-BOX = Path(__file__).parents[1] / "render" / "scenes" / "box"
 AUTHORED = np.array([0.6, 0.1, 0.1, 0.5, 0.25, 0.5, 0.5, 0.5, 0.25, 1 / 3])
 """The v at which the box is as scene.xml says."""
 

@@ -8,8 +8,7 @@ import pytest
 
 from ngi.scene import read_scene, scenes
 from ngi.scene.yaml_keys import load_yaml
-
-BOX = Path(__file__).parents[1] / "render" / "scenes" / "box"
+from tests.render.box import BOX
 
 
 @pytest.fixture

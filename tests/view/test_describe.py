@@ -1,7 +1,6 @@
 """The command that describes scenes: what varies, what is left out, and cameras in walls."""
 
 import shutil
-from pathlib import Path
 
 import pytest
 import yaml
@@ -11,8 +10,7 @@ from ngi.scene import read_scene
 from ngi.scene.clearance import camera_problems, meeting_views
 from ngi.scene.variable_scene import VariableScene
 from ngi.view.describe import main
-
-BOX = Path(__file__).parents[1] / "render" / "scenes" / "box"
+from tests.render.box import BOX
 
 ROOM = """<scene version="3.0.0">
 <integrator type="path"><integer name="max_depth" value="3"/></integrator>

@@ -27,10 +27,9 @@ from tests.learn.composition import run_config
 from tests.learn.lightning_warnings import IGNORED
 from tests.methods.anf import test_runs as anf
 from tests.methods.cnsr import test_runs as cnsr
+from tests.render.box import BOX
 
 pytestmark = IGNORED
-
-BOX = Path(__file__).parents[1] / "render" / "scenes" / "box"
 
 
 def figure(**changed: Any) -> np.ndarray:

@@ -1,7 +1,5 @@
 """The denoiser ANF on a scene that Mitsuba traces."""
 
-from pathlib import Path
-
 import pytest
 import torch
 import torch.nn.functional as F
@@ -13,8 +11,8 @@ from ngi.methods.anf import AffinityDenoiser, Sequences, SequenceSmape
 from ngi.patches import Patches
 from ngi.render.mitsuba_renderer import MitsubaRenderer
 from ngi.scene import read_scene
+from tests.render.box import BOX
 
-BOX = Path(__file__).parents[2] / "render" / "scenes" / "box"
 SIZE, FRAMES = 32, 3
 COPIES = 4  # sequences of the same v, each with noise of its own
 
