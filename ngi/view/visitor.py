@@ -20,14 +20,13 @@ from ngi.view.scene_view import Place
 from ngi.view.screen import Pixels
 from ngi.view.session import Wish
 from ngi.view.studio import Shown, Studio
-from ngi.view.subject import Subject, Vector
+from ngi.view.subject import Subject
+from ngi.view.walk import Walk
 
 SMALL = 128
 """Pixels a side up to which JPEG would not be faster than PNG, and its colours would run."""
 RATE_OVER = 2.0
 """Seconds over which pictures per second are counted."""
-ECHOES = 200
-"""Views that the page has asked for and a browser may still answer."""
 GREY = 24
 """Of what is beside the picture where the window has another shape."""
 
@@ -44,7 +43,6 @@ class Visitor:
         self._last: Shown | None = None
         self._aspect = 1.0
         self._moments: deque[float] = deque(maxlen=100)
-        self._aims: deque[tuple[Vector, Vector]] = deque(maxlen=ECHOES)
         start = next(iter(subject.presets.values()))
         self._panel = Panel(
             client.gui,
@@ -58,9 +56,7 @@ class Visitor:
         )
         self._add_files()
         client.camera.on_update(self._refit)
-        if subject.camera is not None:
-            self._aim()
-            client.camera.on_update(self._walk)
+        self._walk = None if subject.camera is None else Walk(client, subject.camera, self._panel)
 
     @property
     def wish(self) -> Wish:
@@ -88,39 +84,8 @@ class Visitor:
     def _changed(self) -> None:
         self._studio.change(self._client.client_id, self.wish)
         self._command.value = self._command_line()
-        if self._subject.camera is not None:
-            self._aim()
-
-    def _aim(self) -> None:
-        """Puts the browser's camera where v has the scene's."""
-        camera = self._subject.camera
-        assert camera is not None
-        origin, target = camera.view(self._panel.v)
-        mine = self._client.camera
-        if _same_view((mine.position, mine.look_at), (origin, target)):
-            return
-        self._aims.append((origin, target))
-        with self._client.atomic():
-            mine.up_direction = np.asarray(camera.up)
-            mine.position = origin
-            mine.look_at = target
-
-    def _walk(self, mine: viser.CameraHandle) -> None:
-        """Takes over into v where a mouse has moved the browser's camera.
-
-        Where the page has put it, the browser says so some time later: that is no wish of its user.
-        """
-        camera = self._subject.camera
-        assert camera is not None
-        there = (mine.position, mine.look_at)
-        if any(_same_view(there, aim) for aim in tuple(self._aims)):
-            return
-        v = np.array(self._panel.v)
-        moved = camera.components(mine.position, mine.look_at)
-        if np.allclose(v[camera.part], moved, atol=1e-3):
-            return
-        v[camera.part] = moved
-        self._panel.set_v(v.tolist())
+        if self._walk is not None:
+            self._walk.follow()
 
     def _status(self, shown: Shown, *, sending: float) -> str:
         view = shown.view
@@ -206,11 +171,6 @@ def _exr(shown: Shown) -> bytes:
         path = Path(folder) / "picture.exr"
         write_exr(path, shown.view.reference if traced else shown.view.prediction)
         return path.read_bytes()
-
-
-def _same_view(one: tuple[Vector, Vector], other: tuple[Vector, Vector]) -> bool:
-    """Whether origins and targets are the same, to a browser's precision."""
-    return np.allclose(np.stack(one), np.stack(other), atol=1e-3)
 
 
 def _captioned(shown: Shown) -> Pixels:

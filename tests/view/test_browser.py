@@ -195,6 +195,7 @@ def test_the_mouse_walks_the_camera_within_its_box(
     assert status == 0, output
     with viewer(tmp_path, free_port()) as address:
         page = opened(browser, address)
+        page.wait_for_timeout(2000)
         before, start = picture(page), walked(page)
         box = page.locator("canvas").first.bounding_box()
         assert box is not None
@@ -210,6 +211,9 @@ def test_the_mouse_walks_the_camera_within_its_box(
         assert all(0 <= component <= 1 for component in end)
         options = shlex.split(command(page))[2:-1]
         np.testing.assert_array_equal(picture(page), rendered(tmp_path, options))
+        page.get_by_role("button", name="reset").click()
+        page.wait_for_timeout(2000)
+        assert walked(page) == start  # which no message of the browser's had changed
 
 
 def walked(page: playwright.Page) -> list[float]:

@@ -1,0 +1,75 @@
+"""Keeps a browser's camera where v has the scene's, and v where a mouse has moved that camera."""
+
+from threading import RLock
+from time import time
+
+import numpy as np
+import viser
+
+from ngi.view.panel import Panel
+from ngi.view.subject import Camera, Vector
+
+PATIENCE = 5.0
+"""Seconds after which a browser is believed that never was exactly where the page has put it."""
+
+
+class Walk:
+    """Of one browser. Its camera tells of every move some time later, in any of several threads.
+
+    camera: of the scene
+    """
+
+    def __init__(self, client: viser.ClientHandle, camera: Camera, panel: Panel) -> None:
+        self._client = client
+        self._camera = camera
+        self._panel = panel
+        self._lock = RLock()
+        self._part: tuple[float, ...] | None = None  # of v, that the browser shows or soon will
+        self._there = False  # whether the browser has been where it was put last
+        self._put_in = 0.0
+        self.follow()
+        client.camera.on_update(self._moved)
+
+    def follow(self) -> None:
+        """Puts the browser's camera where v has the scene's, unless it has led v there."""
+        with self._lock:
+            part = self._panel.v[self._camera.part]
+            if part == self._part:
+                return
+            self._part = part
+            self._put = self._camera.view(self._panel.v)
+            mine = self._client.camera
+            while not _same_view((mine.position, mine.look_at), self._put):
+                with self._client.atomic():
+                    mine.up_direction = np.asarray(self._camera.up)
+                    mine.position, mine.look_at = self._put  # a message between these undoes one
+                self._there, self._put_in = False, time()
+
+    def _moved(self, mine: viser.CameraHandle) -> None:
+        """Takes over into v where a mouse has moved the browser's camera.
+
+        Until the browser is where the page has put it, it tells of before, which is no wish of its
+        user. It is left where the mouse has moved it to, beside the box of v's camera as well.
+        """
+        with self._lock:
+            if mine.update_timestamp <= self._put_in:  # says what was put, not where it is
+                return
+            view = (mine.position, mine.look_at)
+            if _same_view(view, self._put):
+                self._there = True
+                return
+            if not self._there and time() < self._put_in + PATIENCE:
+                return
+            v = np.array(self._panel.v)
+            moved = self._camera.components(*view)
+            if np.allclose(v[self._camera.part], moved, atol=1e-3):
+                return
+            v[self._camera.part] = moved
+            self._part = tuple(moved.tolist())
+            self._panel.set_v(v.tolist())
+
+
+def _same_view(one: tuple[Vector, Vector], other: tuple[Vector, Vector]) -> bool:
+    """Whether origins and targets are the same, to a browser's precision."""
+    distance = float(np.linalg.norm(other[1] - other[0]))
+    return np.allclose(np.stack(one), np.stack(other), atol=1e-3 * distance)
