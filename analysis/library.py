@@ -10,7 +10,7 @@ from pathlib import Path
 import pandas as pd
 
 from analysis.methods import name_methods
-from analysis.runs import METRICS, RELMSE, SETS, Run, find_runs
+from analysis.runs import FURTHER, METRICS, SETS, Run, find_runs
 from analysis.step_log import read_steps
 
 KEYS = ["scene", "method", "seed"]
@@ -49,7 +49,8 @@ class Results:
         """A row per evaluation, set, metric and statistic, with the value.
 
         Columns: step, run_seconds, set ('hard', 'uniform'), metric ('mape', 'dssim', 'mae',
-        'lpips', and 'relmse', of which there is the mean alone, where it was measured), statistic
+        'lpips', and where they were measured 'relmse' and 'tail', which
+        `ngi.evaluate.Evaluation.row` explains and which have a mean alone), statistic
         ('mean', 'worst5': of the worst 5 % of the frames), value (NaN where it was not measured).
         """
         columns = {
@@ -58,7 +59,9 @@ class Results:
             for metric in METRICS
             for suffix, statistic in (("", "mean"), ("_worst5", "worst5"))
         }
-        columns |= {f"{set_name}_{RELMSE}": (set_name, RELMSE, "mean") for set_name in SETS}
+        columns |= {
+            f"{name}_{metric}": (name, metric, "mean") for name in SETS for metric in FURTHER
+        }
         wide = self._tables([run.history for run in self.found])
         there = [column for column in columns if column in wide]
         tidy = wide.melt([*KEYS, "step", "run_seconds"], there, "key", "value")

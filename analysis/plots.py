@@ -17,7 +17,7 @@ from matplotlib.ticker import FuncFormatter, Locator, LogLocator, MaxNLocator, N
 
 from analysis.curves import Curve, error_curve
 from analysis.methods import methods_in_order, title
-from analysis.runs import METRICS, RELMSE, SETS, Run
+from analysis.runs import FURTHER, METRICS, SETS, Run
 from analysis.tables import TITLES
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -97,11 +97,12 @@ class ErrorPanel:
 
 
 def scene_panels(runs: Sequence[Run], set_name: str, *, log_time: bool = False) -> list[ErrorPanel]:
-    """A panel per metric for the runs of one scene, and one of relMSE where all have it."""
-    measured = all(f"{name}_{RELMSE}" in run.history for run in runs for name in SETS)
+    """A panel per metric for the runs of one scene, and of what else all have."""
+    columns = set.intersection(*(set(run.history) for run in runs))
+    further = [each for each in FURTHER if {f"{name}_{each}" for name in SETS} <= columns]
     return [
         ErrorPanel(f"{TITLES[metric]}, {set_name} frames", runs, set_name, metric, log_time)
-        for metric in (*METRICS, *([RELMSE] if measured else []))
+        for metric in (*METRICS, *further)
     ]
 
 
@@ -157,7 +158,7 @@ def _draw(axes: Axes, panel: ErrorPanel, styles: Mapping[str, dict[str, Any]]) -
     curves: list[Curve] = []
     for method in methods_in_order(panel.runs):
         runs = [run for run in panel.runs if run.method == method]
-        curve = error_curve(runs, key, signed=panel.metric == RELMSE)
+        curve = error_curve(runs, key, signed=panel.metric == "relmse")
         if curve is None:
             continue
         curves.append(curve)

@@ -20,7 +20,7 @@ from analysis.run_checks import (
     read_table,
 )
 
-__all__ = ["DISTINCTIONS", "METRICS", "RELMSE", "SETS", "Run", "check_comparable"]
+__all__ = ["DISTINCTIONS", "FURTHER", "METRICS", "SETS", "Run", "check_comparable"]
 __all__ += ["comparison_warnings", "find_runs"]
 
 SCHEMA_VERSION = 1
@@ -29,8 +29,8 @@ SCHEMA_VERSION = 1
 MOST_TIME_APART = 0.05
 """Relative difference of run times up to which runs count as given the same time."""
 
-RELMSE = "relmse"
-"""Measured beside the paper's metrics; runs of before it was lack it."""
+FURTHER = ("relmse", "tail")
+"""Measured beside the paper's metrics, of a set's frames together; older runs lack them."""
 
 
 @dataclass(frozen=True)
@@ -68,10 +68,10 @@ class Run:
     def metric(self, set_name: str, metric: str, statistic: str = "mean") -> float | None:
         """One metric at the end of the run; statistic is mean, worst5 or floor; None if missing.
 
-        Of `RELMSE` there is the mean alone: it has no floor.
+        Of `FURTHER` there is the mean alone: they have no floor.
         """
-        if metric == RELMSE:
-            found: float | None = self.result.get(RELMSE, {}).get(set_name)
+        if metric in FURTHER:
+            found: float | None = self.result.get(metric, {}).get(set_name)
             return found if statistic == "mean" else None
         summary = self.result["metrics"][set_name][metric]
         return None if summary is None else summary[statistic]

@@ -19,6 +19,7 @@ TITLES = {
     "mae": "MAE",
     "lpips": "LPIPS",
     "relmse": "noise-free relMSE",
+    "tail": "worst 5 % of pixels",
 }
 COST_TITLES = dict(
     zip(

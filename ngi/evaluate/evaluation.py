@@ -7,6 +7,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+import torch
 from PIL import Image
 from torch import Tensor
 
@@ -17,7 +18,7 @@ from ngi.evaluate.references import Reference
 from ngi.files.durable import full_disk_named
 
 WORST_OF = 20
-"""The worst 5 %, one frame of 20, are averaged on their own."""
+"""The worst 5 %, one frame or pixel of 20, are averaged on their own."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,11 @@ def worst_mean(values: Iterable[float]) -> float:
     """
     order = sorted(values, key=lambda value: math.inf if math.isnan(value) else value)
     return mean(order[-math.ceil(len(order) / WORST_OF) :])
+
+
+def worst(values: Tensor) -> Tensor:
+    """The largest 5 % of [n], rounded up to whole ones; NaN counts as largest."""
+    return values.topk(math.ceil(len(values) / WORST_OF)).values
 
 
 def mean(values: Iterable[float]) -> float:
@@ -84,6 +90,13 @@ class EvaluatedFrame:
     relmse: float
     seconds: dict[str, float]
 
+    @property
+    def log_errors(self) -> Tensor:
+        """[H·W] absolute differences of log1p radiance, mean over the channels."""
+        both = (self.prediction, self.reference.radiance)
+        prediction, reference = (radiance.clamp(min=0).log1p() for radiance in both)
+        return (prediction - reference).abs().mean(dim=-1).flatten()
+
     def panels(self, protocol: EvaluationProtocol) -> Panels:
         """Its pictures."""
         return Panels.of(
@@ -109,7 +122,10 @@ class Evaluation:
 
     def row(self) -> dict[str, float | int | None]:
         """One flat row for metrics.csv: `hard_mape`, `hard_mape_worst5`, …, `hard_relmse`,
-        `hard_non_finite`, ….
+        `hard_tail`, `hard_non_finite`, ….
+
+        The tail is the mean absolute difference of log1p radiance over the worst 5 % of all pixels
+        of a set's frames.
 
         The keys never depend on the values; LPIPS is None where it is not available.
         """
@@ -121,6 +137,8 @@ class Evaluation:
                 row[f"{set_name}_{metric}"] = None if values is None else mean(values)
                 row[f"{set_name}_{metric}_worst5"] = None if values is None else worst_mean(values)
             row[f"{set_name}_relmse"] = mean(frame.relmse for frame in self._of(set_name))
+            log_errors = torch.cat([frame.log_errors for frame in self._of(set_name)])
+            row[f"{set_name}_tail"] = worst(log_errors).mean().item()
             row[f"{set_name}_non_finite"] = sum(frame.non_finite for frame in metrics)
         return row
 
@@ -128,9 +146,9 @@ class Evaluation:
         """This evaluation's part of result.json: plain JSON data.
 
         protocol: {name, identity}; reference_hash; metrics: {set: {metric: {mean, worst5, floor}
-        or null}}; relmse: {set: mean}; non_finite: {set: pixels}; frames: per frame its metrics,
-        relMSE, and its reference's noise and samples per pixel; frame_seconds: by part, median over
-        the frames; lpips_note.
+        or null}}; relmse: {set: mean}; tail: {set: as in `row`}; non_finite: {set: pixels}; frames:
+        per frame its metrics, relMSE, and its reference's noise and samples per pixel;
+        frame_seconds: by part, median over the frames; lpips_note.
         """
         row = self.row()
         return {
@@ -141,6 +159,7 @@ class Evaluation:
                 for set_name in SETS
             },
             "relmse": {set_name: row[f"{set_name}_relmse"] for set_name in SETS},
+            "tail": {set_name: row[f"{set_name}_tail"] for set_name in SETS},
             "non_finite": {set_name: row[f"{set_name}_non_finite"] for set_name in SETS},
             "frames": [
                 {

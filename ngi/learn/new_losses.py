@@ -1,11 +1,9 @@
 """What patches lost when the network first met them, and how few of them lost most of it."""
 
-import math
-
 import torch
 from torch import Tensor
 
-from ngi.evaluate.evaluation import WORST_OF
+from ngi.evaluate.evaluation import worst
 from ngi.learn.noise import without_noise
 
 REMEMBERED = 1024
@@ -53,8 +51,3 @@ def worst_share(losses: Tensor) -> float:
     """
     losses = losses.double()
     return (worst(losses).sum() / losses.sum()).item()
-
-
-def worst(values: Tensor) -> Tensor:
-    """The largest 5 % of [n], rounded up to whole ones."""
-    return values.topk(math.ceil(len(values) / WORST_OF)).values

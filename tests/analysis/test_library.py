@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 from analysis import load_runs
+from analysis.runs import FURTHER
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 
@@ -43,12 +44,13 @@ def test_evaluations_are_a_value_a_row(folder) -> None:
     assert rows["run_seconds"].tolist() == run.history["run_seconds"].tolist()
 
 
-def test_relmse_is_there_where_it_was_measured(folder) -> None:
+@pytest.mark.parametrize("metric", FURTHER)
+def test_further_metrics_are_there_where_they_were_measured(folder, metric: str) -> None:
     for file in folder.glob("mirror/*/seed=1/metrics.csv"):
         table = pd.read_csv(file)
-        table["hard_relmse"] = -0.125 * table["step"]
+        table[f"hard_{metric}"] = -0.125 * table["step"]
         table.to_csv(file, index=False)
-    found = load_runs(folder).evaluations.query("metric == 'relmse'").dropna()
+    found = load_runs(folder).evaluations.query(f"metric == {metric!r}").dropna()
     assert set(zip(found["scene"], found["seed"], strict=True)) == {("mirror", 1)}
     assert set(found["set"]) == {"hard"}
     assert set(found["statistic"]) == {"mean"}

@@ -14,7 +14,8 @@ from analysis.curves import error_curve
 from analysis.methods import name_methods
 from analysis.plots import COLOURS, method_styles
 from analysis.report import main
-from analysis.runs import Run, find_runs
+from analysis.runs import FURTHER, Run, find_runs
+from analysis.tables import TITLES
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 
@@ -61,20 +62,21 @@ def test_report_writes_everything_it_names(two_scenes, capsys) -> None:
     ElementTree.parse(report / "error_mirror.svg")
 
 
-def test_relmse_is_drawn_where_all_runs_of_a_scene_have_it(two_scenes) -> None:
+@pytest.mark.parametrize("metric", FURTHER)
+def test_what_else_all_runs_of_a_scene_have_is_drawn(two_scenes, metric: str) -> None:
     for number, file in enumerate(sorted(two_scenes.rglob("metrics.csv"))):
         if file.is_relative_to(two_scenes / "mirror") or number % 2:
             table = pd.read_csv(file)
             for name in ("hard", "uniform"):
-                table[f"{name}_relmse"] = 0.01 / (1 + table["step"])
+                table[f"{name}_{metric}"] = 0.01 / (1 + table["step"])
             table.to_csv(file, index=False)
     assert main([str(two_scenes)]) == 0
     drawn = {
         scene: (two_scenes / "report" / f"error_{scene}.svg").read_text()
         for scene in ("mirror", "sphere-caustic")
     }
-    assert drawn["mirror"].count("noise-free relMSE") == 2
-    assert "noise-free relMSE" not in drawn["sphere-caustic"]
+    assert drawn["mirror"].count(TITLES[metric]) == 2
+    assert TITLES[metric] not in drawn["sphere-caustic"]
     assert drawn["sphere-caustic"].count("LPIPS") == 2
 
 

@@ -70,6 +70,21 @@ def test_relmse_is_that_of_the_truth_whatever_the_references_noise(evaluator, re
     assert abs(perfectly["relmse"]["hard"]) < 0.001 < perfectly["metrics"]["hard"]["mape"]["floor"]
 
 
+def test_the_tail_is_the_worst_twentieth_of_all_pixels_of_a_set(evaluator) -> None:
+    evaluation = evaluator.evaluate(lambda buffers, v: torch.log1p(buffers * (1 + v[0])))
+    for name in SETS:
+        frames = [each for each in evaluation.frames if each.frame.set == name]
+        errors = [
+            np.abs(np.log1p(each.prediction.numpy()) - np.log1p(each.reference.radiance.numpy()))
+            for each in frames
+        ]
+        pixels = np.sort(np.stack(errors).mean(axis=-1), axis=None)
+        expected = pixels[-math.ceil(0.05 * pixels.size) :].mean()
+        assert evaluation.row()[f"{name}_tail"] == pytest.approx(expected, rel=1e-4)
+        assert evaluation.result()["tail"][name] == evaluation.row()[f"{name}_tail"]
+        assert expected > 1.5 * pixels.mean()
+
+
 def test_values_are_those_of_the_metrics(evaluator, renderer, protocol, tmp_path) -> None:
     evaluation = evaluator.evaluate(lambda b, v: torch.log1p(b * (1 + v[0])))
     result = evaluation.result()
@@ -206,7 +221,7 @@ def test_row_and_result_can_be_written_and_have_fixed_keys(evaluator, tmp_path) 
         for name in SETS
         for key in (
             *(f"{name}_{m}{suffix}" for m in METRICS for suffix in ("", "_worst5")),
-            *(f"{name}_relmse", f"{name}_non_finite"),
+            *(f"{name}_relmse", f"{name}_tail", f"{name}_non_finite"),
         )
     ]
     assert list(row) == expected

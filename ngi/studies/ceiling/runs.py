@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import torch
@@ -11,7 +11,7 @@ from torch import Tensor
 
 from ngi.evaluate import METRICS, SETS, Evaluation, Evaluator
 from ngi.explore import Importance
-from ngi.learn.new_losses import worst, worst_share
+from ngi.learn.new_losses import worst_share
 from ngi.reuse import CompactPatches
 from ngi.studies.ceiling.pool import chosen
 from ngi.studies.ceiling.training import Training
@@ -106,31 +106,15 @@ def true_errors(
 
 
 def measured(evaluation: Evaluation) -> dict[str, float]:
-    """Per set: every metric, their geometric mean as `SET_error`, `SET_relmse` and `SET_tail`.
-
-    The tail is the mean absolute difference of log1p radiance over the worst 5 % of all pixels.
-    """
+    """Per set: every metric, their geometric mean as `SET_error`, `SET_relmse` and `SET_tail`."""
     row = evaluation.row()
     result: dict[str, float] = {}
     for name in SETS:
-        keys = [f"{name}_{metric}" for metric in (*METRICS, "relmse")]
+        keys = [f"{name}_{metric}" for metric in (*METRICS, "relmse", "tail")]
         result |= {key: float(value) for key in keys if (value := row[key]) is not None}
         known = [result[key] for key in keys[: len(METRICS)] if key in result]
         result[f"{name}_error"] = math.exp(sum(math.log(value) for value in known) / len(known))
-        result[f"{name}_tail"] = _tail(evaluation, name)
     return result
-
-
-def _tail(evaluation: Evaluation, name: str) -> float:
-    log: Callable[[Tensor], Tensor] = lambda radiance: radiance.clamp(min=0).log1p()  # noqa: E731
-    errors = torch.cat(
-        [
-            (log(each.prediction) - log(each.reference.radiance)).abs().mean(dim=-1).flatten()
-            for each in evaluation.frames
-            if each.frame.set == name
-        ]
-    )
-    return worst(errors).mean().item()
 
 
 def _part(whole: int, number: int, parts: int) -> int:
