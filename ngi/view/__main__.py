@@ -50,6 +50,7 @@ def view(options: ViewOptions) -> None:
         description=run.description,
         renderer=run.renderer,
         protocol=run.protocol,
+        scene=options.scene,
     )
     with (
         closing(run.renderer),

@@ -67,7 +67,7 @@ class LiveView(Callback):
         with self._run.clock.phase("evaluate"):
             if due:
                 self._studio.network_changed()
-                self._refresh()
+                self._try_to_refresh()
                 self._refresh_from = monotonic() + REFRESH
             self._studio.work(wait=0)
         spent = monotonic() - begin
@@ -87,6 +87,12 @@ class LiveView(Callback):
         if record is not None and "position" in record:
             states = torch.from_numpy(np.asarray(record["position"]))
             self._visited.append((states, torch.from_numpy(record["target_proposed"])))
+
+    def _try_to_refresh(self) -> None:
+        try:
+            self._refresh()
+        except Exception:
+            log.exception("the page's picture of the training failed; the training goes on")
 
     def _refresh(self) -> None:
         store, current = self._run.stream.store, self._run.stream.chains.position
@@ -123,6 +129,7 @@ def live_view(
         description=description,
         renderer=run.renderer,
         protocol=protocol,
+        scene=None,
     )
 
     def predict(buffers: Tensor, v: Tensor) -> Tensor:

@@ -1,6 +1,7 @@
 """The web server whose page shows a network, to any number of browsers and to no other page."""
 
 import logging
+import socket
 import warnings
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager
@@ -9,6 +10,7 @@ from threading import Lock
 from typing import Any
 from urllib.parse import urlsplit
 
+import numpy as np
 import viser
 from websockets.asyncio import server as websockets_server
 from websockets.asyncio.server import ServerConnection
@@ -33,7 +35,18 @@ def viser_server(*, host: str, port: int, label: str | None = None) -> viser.Vis
     from: that has to be this server, as the browser was told its name (through a tunnel the port
     may differ). Bound to a loopback address, the name must be one too, so that no foreign name that
     resolves to it does. Programs that are no browsers give no origin and are let in.
+
+    Raises ValueError for a port that there is not and a host that is not this machine: viser would
+    wait for ever.
     """
+    if not 0 <= port < 2**16:
+        raise ValueError(f"port: {port}: give 0 to {2**16 - 1}")
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(host, 0, type=socket.SOCK_STREAM)[0]
+        with socket.socket(family, kind, protocol) as probe:
+            probe.bind(address)
+    except OSError as error:
+        raise ValueError(f"host: {host}: no address of this machine: {error}") from error
     with _checking_origins(host):
         return viser.ViserServer(host=host, port=port, label=label, verbose=False)
 
@@ -88,6 +101,10 @@ class Page:
         self._server = viser_server(host=host, port=port, label=subject.name)
         self._server.gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
         self._server.gui.main_panel.dock_right()
+        if subject.camera is not None:  # where "Reset View" leads
+            first = self._server.initial_camera
+            first.position, first.look_at = subject.camera.view(subject.start)
+            first.up = np.asarray(subject.camera.up)
         self._server.on_client_connect(self._welcome)
         self._server.on_client_disconnect(lambda client: studio.close(client.client_id))
         self.address = f"http://{host}:{self._server.get_port()}"
@@ -107,6 +124,6 @@ class Page:
 
     def _welcome(self, client: viser.ClientHandle) -> None:
         visitor = Visitor(client, self._subject, self._studio, resolution=self._resolution)
-        self._studio.open(client.client_id, visitor.wish, visitor.show)
+        self._studio.open(client.client_id, visitor.wish, visitor.show, visitor.failed)
         if client.client_id not in self._server.get_clients():  # it left while that was built
             self._studio.close(client.client_id)

@@ -4,6 +4,8 @@ import json
 import random
 from collections.abc import Callable, Sequence
 from itertools import groupby
+from threading import RLock
+from time import time
 from typing import Any
 
 import viser
@@ -25,7 +27,9 @@ class Panel:
     v: at first
     presets: configurations by name, each of length D
     buffers: names of those that can be shown
-    on_change: called, in a thread of the browser's, after anything was changed
+    on_change: called, in a thread of the browser's that holds `lock`, after anything was changed
+
+    `lock` is held while v changes; `touched` is when a control was last used, as `time.time()`.
     """
 
     def __init__(
@@ -40,6 +44,8 @@ class Panel:
         epsilon: float,
         on_change: Callable[[], None],
     ) -> None:
+        self.lock = RLock()
+        self.touched = 0.0
         self._gui = gui
         self._v = [float(number) for number in v]
         self._start = tuple(self._v)
@@ -76,10 +82,11 @@ class Panel:
 
     def set_v(self, v: Sequence[float]) -> None:
         """Moves every control there."""
-        self._v = [float(number) for number in v]
-        for each, made in self._inputs:
-            made.value = each.shown(self._v)
-        self._on_change()
+        with self.lock:
+            self._v = [float(number) for number in v]
+            for each, made in self._inputs:
+                made.value = each.shown(self._v)
+            self._on_change()
 
     def reset(self) -> None:
         """Everything as it was at first."""
@@ -137,7 +144,7 @@ class Panel:
         settings: list[Any] = [self._show, self._resolution, self._curve, self._exposure]
         self._at_first = [(each, each.value) for each in settings]
         for each in settings:
-            each.on_update(lambda _: self._on_change())
+            each.on_update(lambda _: self._used())
 
     def _add_inputs(self, controls: Sequence[Control]) -> None:
         if len(controls) > MOST_SLIDERS:
@@ -152,8 +159,14 @@ class Panel:
 
     def _read(self, changed: Input, value: Any) -> None:
         """Takes over what a user has set; what `set_v` has set says nothing new."""
-        if value == changed.shown(self._v):
-            return
-        for component, number in changed.components(value).items():
-            self._v[component] = number
-        self._on_change()
+        with self.lock:
+            if value == changed.shown(self._v):
+                return
+            for component, number in changed.components(value).items():
+                self._v[component] = number
+            self._used()
+
+    def _used(self) -> None:
+        with self.lock:
+            self.touched = time()
+            self._on_change()

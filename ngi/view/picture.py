@@ -60,6 +60,8 @@ def write_picture(options: PictureOptions) -> None:
                 f"resolution: {options.resolution}: the metrics that a reference is compared by "
                 f"take at least {run.protocol.smallest_resolution}"
             )
+        weights = os.environ.get("NGI_LPIPS_WEIGHTS")
+        lpips = Lpips(weights=weights) if options.reference else None
         v = _scene_vector(options, run.renderer)
         begin = perf_counter()
         radiance = run.radiance(v, resolution=options.resolution)
@@ -73,7 +75,6 @@ def write_picture(options: PictureOptions) -> None:
     _write(_beside(out, "reference"), reference, exposure=options.exposure)
     error = Image.fromarray(error_picture(radiance, reference, run.protocol.epsilon))
     error.save(_beside(out, "error").with_suffix(".png"))
-    lpips = Lpips(weights=os.environ.get("NGI_LPIPS_WEIGHTS"))
     measured = image_metrics(radiance, reference, protocol=run.protocol, lpips=lpips)
     print(", ".join(f"{name} {value:.4g}" for name, value in measured.items() if value is not None))
 

@@ -15,6 +15,10 @@ from ngi.view.inputs import Control, controls, unnamed_controls
 
 Vector = NDArray[np.float64]
 
+ROUNDING = 1e-9
+NEAREST = 1e-3
+"""In lengths of a view's direction: no target is nearer to its origin, or behind it."""
+
 
 @dataclass(frozen=True)
 class Camera:
@@ -39,19 +43,34 @@ class Camera:
         """Those components of v that come closest to a view; origin and target in world space.
 
         The target counts as a direction only, since a mouse that turns a camera does not say how
-        far away it looks. It is moved in this direction to the middle of its box.
+        far away it looks. It is moved in this direction to where that comes closest to the middle
+        of its box: within the box, where the direction leads through it.
         """
         low, high = np.array(self.variable.minimum), np.array(self.variable.maximum)
         start = np.clip(np.asarray(origin, dtype=np.float64), low[:3], high[:3])
         direction = np.asarray(target, dtype=np.float64) - np.asarray(origin, dtype=np.float64)
-        middle = (low[3:] + high[3:]) / 2
-        length = direction @ direction
-        along = max((middle - start) @ direction / length, 1e-3) if length > 0 else 0.0
+        along = _along(direction, low[3:] - start, high[3:] - start)
         end = np.clip(start + along * direction, low[3:], high[3:])
         varied = low != high
         value = np.concatenate([start, end])[varied]
         components: Vector = np.clip((value - low[varied]) / (high - low)[varied], 0, 1)
         return components
+
+
+def _along(direction: Vector, low: Vector, high: Vector) -> float:
+    """How far to go, in lengths of `direction`, to come closest to the middle of a box.
+
+    direction, low, high: [3], from where it begins; in the box, if the way leads through it
+    """
+    moving = direction != 0
+    if not moving.any():
+        return 0.0
+    along = (low + high) / 2 @ direction / (direction @ direction)
+    walls = np.stack([low, high])[:, moving] / direction[moving]
+    enters, leaves = walls.min(axis=0).max(), walls.max(axis=0).min()
+    if enters <= leaves + ROUNDING:
+        along = np.clip(along, enters, leaves)
+    return max(float(along), NEAREST)
 
 
 def camera_of(description: SceneDescription) -> Camera | None:
@@ -73,6 +92,7 @@ class Subject:
     buffers: names of those that the network is fed
     camera: None where v does not let it walk
     protocol: that metrics are measured by
+    scene: its folder, where the run's own files do not say it
     """
 
     name: str
@@ -82,6 +102,12 @@ class Subject:
     buffers: tuple[str, ...]
     camera: Camera | None
     protocol: EvaluationProtocol
+    scene: str | None
+
+    @property
+    def start(self) -> Sequence[float]:
+        """Where a page begins: the first of the presets, [D]."""
+        return next(iter(self.presets.values()))
 
 
 def subject(
@@ -91,6 +117,7 @@ def subject(
     description: SceneDescription | None,
     renderer: Renderer,
     protocol: EvaluationProtocol,
+    scene: str | None,
 ) -> Subject:
     """description: of the scene; None for closed formulas, whose variables have no names."""
     frames = renderer.hard_frames().tolist()
@@ -104,4 +131,5 @@ def subject(
         buffers=renderer.layout.names,
         camera=None if description is None else camera_of(description),
         protocol=protocol,
+        scene=scene,
     )

@@ -3,8 +3,10 @@
 import io
 import shlex
 from collections import deque
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from threading import Lock
 from time import perf_counter
 from typing import Any
 
@@ -27,6 +29,8 @@ SMALL = 128
 """Pixels a side up to which JPEG would not be faster than PNG, and its colours would run."""
 RATE_OVER = 2.0
 """Seconds over which pictures per second are counted."""
+WIDEST = 8
+"""Width / height of a window, or the other way round, from which on a picture does not fit."""
 GREY = 24
 """Of what is beside the picture where the window has another shape."""
 
@@ -42,12 +46,12 @@ class Visitor:
         self._studio = studio
         self._last: Shown | None = None
         self._aspect = 1.0
+        self._sending = Lock()
         self._moments: deque[float] = deque(maxlen=100)
-        start = next(iter(subject.presets.values()))
         self._panel = Panel(
             client.gui,
             controls=subject.controls,
-            v=start,
+            v=subject.start,
             presets=dict(subject.presets),
             buffers=subject.buffers,
             resolution=resolution,
@@ -65,21 +69,33 @@ class Visitor:
     def show(self, shown: Shown) -> None:
         """Sends a picture; in the thread that made it."""
         begin = perf_counter()
-        self._send(shown)
+        with self._sending:
+            self._send(shown)
         self._moments.append(perf_counter())
         self._panel.status.content = self._status(shown, sending=perf_counter() - begin)
 
+    def failed(self, error: Exception) -> None:
+        """Tells why there is no picture."""
+        self._panel.status.content = f"This picture failed: {error}"
+
     def _send(self, shown: Shown) -> None:
-        self._last, self._aspect = shown, self._client.camera.aspect
+        self._last, self._aspect = shown, self._window()
         pixels = _fitted(_captioned(shown), self._aspect)
         exactly = shown.full or len(shown.pixels) <= SMALL
         self._client.scene.set_background_image(pixels, format="png" if exactly else "jpeg")
         self._client.flush()
 
-    def _refit(self, mine: viser.CameraHandle) -> None:
+    def _refit(self, _: viser.CameraHandle) -> None:
         """Sends the picture again where the window has got another shape."""
-        if self._last is not None and not np.isclose(mine.aspect, self._aspect):
-            self._send(self._last)
+        with self._sending:
+            if self._last is not None and not np.isclose(self._window(), self._aspect):
+                self._send(self._last)
+
+    def _window(self) -> float:
+        """Width / height of the browser's, as far as a picture is made to fit it."""
+        camera = self._client.camera
+        shape = camera.image_width / max(1, camera.image_height)
+        return min(max(shape, 1 / WIDEST), WIDEST)
 
     def _changed(self) -> None:
         self._studio.change(self._client.client_id, self.wish)
@@ -141,7 +157,8 @@ class Visitor:
         @exr.on_click
         def _(_: object) -> None:
             if self._last is not None:
-                client.send_file_download("picture.exr", _exr(self._last), save_immediately=True)
+                # of a buffer the network's picture may not be there yet
+                self._studio.ask(partial(self._send_exr, self._last), self.failed)
 
         @save.on_click
         def _(_: object) -> None:
@@ -154,14 +171,17 @@ class Visitor:
             except ValueError as error:
                 client.add_notification("This file cannot be loaded", str(error), color="red")
 
+    def _send_exr(self, shown: Shown) -> None:
+        self._client.send_file_download("picture.exr", _exr(shown), save_immediately=True)
+
     def _command_line(self) -> str:
         v = ",".join(f"{number:.6g}" for number in self._panel.v)
-        return shlex.join(
-            [
-                *("ngi", "render", f"run={self._subject.folder}", f"v=[{v}]"),
-                *(f"resolution={self._panel.resolution}", "out=picture.png"),
-            ]
-        )
+        words = [f"run={self._subject.folder}", f"v=[{v}]", f"resolution={self._panel.resolution}"]
+        if self._subject.scene is not None:
+            words.append(f"scene={self._subject.scene}")
+        if exposure := self._panel.screen.exposure:
+            words.append(f"exposure={exposure:g}")
+        return shlex.join(["ngi", "render", *words, "out=picture.png"])
 
 
 def _exr(shown: Shown) -> bytes:

@@ -1,6 +1,5 @@
 """Keeps a browser's camera where v has the scene's, and v where a mouse has moved that camera."""
 
-from threading import RLock
 from time import time
 
 import numpy as np
@@ -11,6 +10,10 @@ from ngi.view.subject import Camera, Vector
 
 PATIENCE = 5.0
 """Seconds after which a browser is believed that never was exactly where the page has put it."""
+KEYSTROKE = 0.3
+"""Seconds after a control has changed in which the camera moves by the same key, not by a mouse."""
+ASIDE = 0.01
+"""Of the distance to the target."""
 
 
 class Walk:
@@ -23,27 +26,34 @@ class Walk:
         self._client = client
         self._camera = camera
         self._panel = panel
-        self._lock = RLock()
         self._part: tuple[float, ...] | None = None  # of v, that the browser shows or soon will
-        self._there = False  # whether the browser has been where it was put last
+        self._there = True  # whether the browser has been where it was put last
         self._put_in = 0.0
         self.follow()
         client.camera.on_update(self._moved)
 
     def follow(self) -> None:
         """Puts the browser's camera where v has the scene's, unless it has led v there."""
-        with self._lock:
-            part = self._panel.v[self._camera.part]
-            if part == self._part:
-                return
-            self._part = part
-            self._put = self._camera.view(self._panel.v)
-            mine = self._client.camera
-            while not _same_view((mine.position, mine.look_at), self._put):
-                with self._client.atomic():
-                    mine.up_direction = np.asarray(self._camera.up)
-                    mine.position, mine.look_at = self._put  # a message between these undoes one
-                self._there, self._put_in = False, time()
+        with self._panel.lock:
+            if self._panel.v[self._camera.part] != self._part:
+                self._put()
+
+    def _put(self) -> None:
+        self._part = self._put_part = self._panel.v[self._camera.part]
+        self._view = origin, target = self._camera.view(self._panel.v)
+        mine = self._client.camera
+        if self._there and _same_view((mine.position, mine.look_at), self._view):
+            return
+        self._there, put = False, False
+        while not put:  # again where a message in between has undone a part
+            with self._client.atomic():
+                mine.up_direction = np.asarray(self._camera.up)
+                # what the browser was last heard to have viser does not send, old as that may be
+                mine.position = origin + ASIDE * (target - origin)
+                mine.position = origin
+                mine.look_at = target
+            self._put_in = time()
+            put = _same_view((mine.position, mine.look_at), self._view)
 
     def _moved(self, mine: viser.CameraHandle) -> None:
         """Takes over into v where a mouse has moved the browser's camera.
@@ -51,21 +61,24 @@ class Walk:
         Until the browser is where the page has put it, it tells of before, which is no wish of its
         user. It is left where the mouse has moved it to, beside the box of v's camera as well.
         """
-        with self._lock:
+        with self._panel.lock:
             if mine.update_timestamp <= self._put_in:  # says what was put, not where it is
                 return
             view = (mine.position, mine.look_at)
-            if _same_view(view, self._put):
-                self._there = True
+            if _same_view(view, self._view):
+                self._there, part = True, self._put_part
+            elif not self._there and time() < self._put_in + PATIENCE:
                 return
-            if not self._there and time() < self._put_in + PATIENCE:
+            elif time() < self._panel.touched + KEYSTROKE:
+                self._put()
                 return
+            else:
+                part = tuple(self._camera.components(*view).tolist())
             v = np.array(self._panel.v)
-            moved = self._camera.components(*view)
-            if np.allclose(v[self._camera.part], moved, atol=1e-3):
+            if np.allclose(v[self._camera.part], part, atol=1e-3):
                 return
-            v[self._camera.part] = moved
-            self._part = tuple(moved.tolist())
+            v[self._camera.part] = part
+            self._part = part
             self._panel.set_v(v.tolist())
 
 

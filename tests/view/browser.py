@@ -35,7 +35,8 @@ class Browser:
             position=np.zeros(3),
             look_at=np.ones(3),
             up_direction=None,
-            aspect=1.0,
+            image_width=600,
+            image_height=600,
             on_update=lambda react: self._reactions.append(react),
         )
         self.scene = SimpleNamespace(
@@ -74,6 +75,7 @@ def subject() -> Subject:
             name="test", resolution=32, low_discrepancy_frames=1, target_noise=1,
             samples_per_pass=1, maximum_samples=2,
         ),
+        scene=None,
     )  # fmt: skip
 
 

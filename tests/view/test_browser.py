@@ -214,6 +214,13 @@ def test_the_mouse_walks_the_camera_within_its_box(
         page.get_by_role("button", name="reset").click()
         page.wait_for_timeout(2000)
         assert walked(page) == start  # which no message of the browser's had changed
+        lamp = page.get_by_role("slider").last
+        lamp.focus()
+        for _ in range(5):
+            lamp.press("ArrowRight", delay=200)
+        page.wait_for_timeout(2000)
+        assert walked(page)[-1] != start[-1]
+        assert walked(page)[:-1] == start[:-1]  # viser turns the camera by these keys
 
 
 def walked(page: playwright.Page) -> list[float]:

@@ -102,6 +102,18 @@ def test_mistakes_are_named(trained: Path, options: tuple[str, ...], message: st
     assert "Traceback" not in output
 
 
+def test_weights_of_lpips_that_are_missing_are_named_before_anything_is_rendered(
+    trained: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("NGI_LPIPS_WEIGHTS", "nowhere.pth")
+    status, output = render(trained, "reference=4", "resolution=48", "out=early.png")
+    assert status == 2
+    assert "nowhere.pth" in output
+    assert not (trained / "early.png").exists()
+    status, output = render(trained, "resolution=48", "out=early.png")
+    assert status == 0, output  # which needs no LPIPS
+
+
 def test_a_damaged_checkpoint_gives_way_to_the_one_before(tmp_path: Path) -> None:
     status, output = run(tmp_path, RUN, "run.checkpoint_steps=4")
     assert status == 0, output

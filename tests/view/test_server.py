@@ -44,6 +44,20 @@ def test_its_own_page_and_programs_are_let_in(port: int) -> None:
 
 
 @pytest.mark.parametrize(
+    ("host", "port", "message"),
+    [
+        ("127.0.0.1", 80_000, "port: 80000: give 0 to 65535"),
+        ("127.0.0.1", -1, "port: -1: give 0 to 65535"),
+        ("192.0.2.1", 8080, "host: 192.0.2.1: no address of this machine"),  # RFC 5737
+        ("no.such.name.invalid", 8080, "host: no.such.name.invalid: no address"),
+    ],
+)
+def test_addresses_that_there_are_not_are_named(host: str, port: int, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        viser_server(host=host, port=port)
+
+
+@pytest.mark.parametrize(
     ("origin", "name", "host", "own"),
     [
         ("http://localhost:9000", "localhost:9000", "127.0.0.1", True),  # through a tunnel

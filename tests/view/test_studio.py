@@ -1,6 +1,6 @@
 """Pictures for several browsers, from closed formulas: the same numbers as without a viewer."""
 
-from threading import Thread
+from threading import Thread, get_ident
 from time import monotonic, sleep
 
 import numpy as np
@@ -27,6 +27,10 @@ def renderer(noise: float = 0.0) -> AnalyticRenderer:
     return AnalyticRenderer(dimensions=3, patch_size=16, noise=noise)
 
 
+def fail(error: Exception) -> None:
+    raise error
+
+
 def settled(studio: Studio) -> None:
     sleep(SETTLED)
     while studio.work(wait=0):
@@ -36,7 +40,7 @@ def settled(studio: Studio) -> None:
 def test_the_picture_is_the_one_computed_without_a_viewer() -> None:
     pictures: list[Shown] = []
     studio = Studio(renderer=renderer(), predict=predict)
-    studio.open("a", Wish(Place(V, 40), Screen(exposure=1.0)), pictures.append)
+    studio.open("a", Wish(Place(V, 40), Screen(exposure=1.0)), pictures.append, fail)
     assert studio.waiting
     assert studio.work(wait=0)
     assert not studio.waiting
@@ -93,6 +97,7 @@ def test_browsers_take_turns_and_new_pictures_come_before_better_ones() -> None:
             name,
             Wish(Place(V, 32), Screen(show)),
             lambda made, name=name: order.append((name, made.view.samples)),  # type: ignore[misc]
+            fail,
         )
     for _ in range(5):
         studio.work(wait=0)
@@ -103,7 +108,7 @@ def test_browsers_take_turns_and_new_pictures_come_before_better_ones() -> None:
 def test_a_browser_that_is_gone_gets_nothing() -> None:
     pictures: list[Shown] = []
     studio = Studio(renderer=renderer(), predict=predict)
-    studio.open("a", Wish(Place(V, 32), Screen()), pictures.append)
+    studio.open("a", Wish(Place(V, 32), Screen()), pictures.append, fail)
     studio.close("a")
     studio.change("a", Wish(Place(V, 64), Screen()))
     assert not studio.work(wait=0)
@@ -114,7 +119,10 @@ def test_waiting_ends_when_something_is_wanted() -> None:
     studio = Studio(renderer=renderer(), predict=predict)
     pictures: list[Shown] = []
     opening = Thread(
-        target=lambda: (sleep(0.2), studio.open("a", Wish(Place(V, 32), Screen()), pictures.append))
+        target=lambda: (
+            sleep(0.2),
+            studio.open("a", Wish(Place(V, 32), Screen()), pictures.append, fail),
+        )
     )
     begin = monotonic()
     opening.start()
@@ -127,7 +135,7 @@ def test_no_backlog_of_pictures_while_a_slider_moves(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(session, "MOVING", 0)  # as on a slow machine
     pictures: list[Shown] = []
     studio = Studio(renderer=renderer(), predict=predict)
-    studio.open("a", Wish(Place(V, 256), Screen()), pictures.append)
+    studio.open("a", Wish(Place(V, 256), Screen()), pictures.append, fail)
     studio.work(wait=0)
     for step in range(50):
         studio.change("a", Wish(Place((step / 50, 0.5, 0.8), 256), Screen()))
@@ -142,7 +150,7 @@ def test_a_network_that_has_learnt_is_shown_again() -> None:
     factor = [1.0]
     pictures: list[Shown] = []
     studio = Studio(renderer=renderer(), predict=lambda b, v: predict(b, v) * factor[0])
-    studio.open("a", Wish(Place(V, 32), Screen()), pictures.append)
+    studio.open("a", Wish(Place(V, 32), Screen()), pictures.append, fail)
     studio.work(wait=0)
     factor[0] = 0.5
     assert not studio.work(wait=0)
@@ -152,11 +160,76 @@ def test_a_network_that_has_learnt_is_shown_again() -> None:
     assert pictures[1].view is pictures[0].view  # its buffers and paths are kept
 
 
+def test_a_picture_that_fails_is_told_and_the_next_one_made(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    def broken(buffers: Tensor, scene_vector: Tensor) -> Tensor:
+        if scene_vector[0] > 0.5:
+            raise RuntimeError("out of memory")
+        return predict(buffers, scene_vector)
+
+    pictures: list[Shown] = []
+    told: list[Exception] = []
+    studio = Studio(renderer=renderer(), predict=broken)
+    studio.open("a", Wish(Place((0.9, 0, 0), 32), Screen()), pictures.append, told.append)
+    settled(studio)
+    assert [str(error) for error in told] == ["out of memory"]
+    assert "a picture of the page failed" in caplog.text
+    studio.change("a", Wish(Place(V, 32), Screen()))
+    settled(studio)
+    assert pictures[-1].full
+    assert len(told) == 1
+
+
+def test_errands_are_done_where_pictures_are_made() -> None:
+    studio = Studio(renderer=renderer(), predict=predict)
+    done: list[int] = []
+    told: list[Exception] = []
+    asking = Thread(
+        target=lambda: (
+            studio.ask(lambda: done.append(get_ident()), fail),
+            studio.ask(lambda: done.append(1 // 0), told.append),
+        )
+    )
+    asking.start()
+    asking.join()
+    assert done == []
+    assert studio.waiting
+    assert studio.work(wait=0)
+    assert studio.work(wait=0)
+    assert not studio.waiting
+    assert done == [get_ident()]
+    assert len(told) == 1
+
+
+def test_what_one_browser_looks_at_another_does_not_push_out() -> None:
+    clean: list[Shown] = []
+    studio = Studio(renderer=renderer(), predict=predict)
+    studio.open("a", Wish(Place(V, 32), Screen("path tracer")), clean.append, fail)
+    studio.work(wait=0)
+    seen = Place((0.2, 0.2, 0.2), 32)
+    studio.open("c", Wish(seen, Screen()), [].append, fail)
+    studio.work(wait=0)
+    traced = Place((0.1, 0.1, 0.1), 32)
+    studio.open("b", Wish(traced, Screen("path tracer")), [].append, fail)
+    studio.work(wait=0)
+    for step in range(2 * KEPT):
+        studio.open("b", Wish(Place((step / 99, 0, 0), 32), Screen()), [].append, fail)
+        studio.work(wait=0)
+    assert len(studio._views) == KEPT
+    assert seen in studio._views
+    assert traced in studio._views  # which is dearer than pictures of the network
+    before = clean[-1].view
+    studio.work(wait=0)
+    assert clean[-1].view is before
+    assert before.samples == 2 * PASS_SAMPLES
+
+
 def test_only_some_views_are_kept() -> None:
     pictures: list[Shown] = []
     studio = Studio(renderer=renderer(), predict=predict)
     for step in range(2 * KEPT):
-        studio.open("a", Wish(Place((step / 99, 0, 0), 32), Screen()), pictures.append)
+        studio.open("a", Wish(Place((step / 99, 0, 0), 32), Screen()), pictures.append, fail)
         studio.work(wait=0)
     assert len(studio._views) == KEPT
 

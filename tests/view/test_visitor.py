@@ -1,6 +1,9 @@
 """What the page shows a browser, which is a stand-in."""
 
+import shlex
 from contextlib import closing
+from dataclasses import replace
+from threading import Thread, get_ident
 from types import SimpleNamespace
 from typing import Any
 
@@ -17,7 +20,8 @@ from ngi.view.scene_view import Place, SceneView  # noqa: E402
 from ngi.view.screen import Screen  # noqa: E402
 from ngi.view.session import Wish  # noqa: E402
 from ngi.view.studio import Shown  # noqa: E402
-from tests.view.browser import Browser, coloured, studio, subject, visitor  # noqa: E402
+from ngi.view.visitor import Visitor  # noqa: E402
+from tests.view.browser import START, Browser, coloured, studio, subject, visitor  # noqa: E402
 
 SIZE = 300
 
@@ -43,7 +47,7 @@ def test_pictures_side_by_side_have_their_names_above_them(
         coloured,
     )
     screen = Screen(show)
-    browser.camera.aspect = parts + 0.0
+    browser.camera.image_width = parts * browser.camera.image_height
     made.show(Shown(screen.pixels(view), view, Wish(view.place, screen), full=True))
     ((pixels, format),) = browser.shown
     assert format == "png"
@@ -55,6 +59,67 @@ def test_pictures_side_by_side_have_their_names_above_them(
         top = np.flatnonzero((half == picture[0, 0]).all(axis=-1).any(axis=1))[0]
         assert (half[:top] > 200).any(), "its name"
         assert match_template(half.mean(-1), picture.mean(-1)).max() > 0.999
+
+
+def test_a_windows_strip_gets_a_picture_all_the_same(browser: Browser) -> None:
+    made = visitor(browser)
+    view = SceneView(Place((0.5,) * 7, 64), AnalyticRenderer(dimensions=7, patch_size=16), coloured)
+    shown = Shown(Screen().pixels(view), view, Wish(view.place, Screen()), full=True)
+    for width, height in ((1400, 1), (1400, 0), (0, 900)):
+        browser.camera.image_width, browser.camera.image_height = width, height
+        made.show(shown)
+        assert max(browser.shown[-1][0].shape) <= 8 * 64
+
+
+def test_the_radiance_of_a_buffers_picture_is_made_where_pictures_are(browser: Browser) -> None:
+    made_in: list[int] = []
+
+    def predict(buffers: torch.Tensor, v: torch.Tensor) -> torch.Tensor:
+        made_in.append(get_ident())
+        return coloured(buffers, v)
+
+    files: list[str] = []
+    browser.send_file_download = lambda name, *_, **__: files.append(name)  # type: ignore[attr-defined]
+    renderer = AnalyticRenderer(dimensions=7, patch_size=16)
+    about = studio()
+    made = Visitor(browser, subject(), about, resolution=64)  # type: ignore[arg-type]
+    view = SceneView(Place((0.5,) * 7, 64), renderer, predict)
+    screen = Screen("albedo")
+    made.show(Shown(screen.pixels(view), view, Wish(view.place, screen), full=True))
+    asking = Thread(target=lambda: press(made, "radiance (EXR)"))
+    asking.start()
+    asking.join()
+    assert made_in == files == []
+    assert about.work(wait=0)
+    assert made_in == [get_ident()]
+    assert files == ["picture.exr"]
+
+
+def press(made: Visitor, label: str) -> None:
+    handles = made._client.gui._gui_input_handle_from_uuid.values()
+    (button,) = (each for each in handles if getattr(each, "label", None) == label)
+    for react in button._impl.update_cb:
+        react(None)
+
+
+def test_the_command_makes_what_is_seen(browser: Browser) -> None:
+    about = replace(subject(), scene="their scene")
+    made = Visitor(browser, about, studio(), resolution=64)  # type: ignore[arg-type]
+    made._panel._exposure.value = 1.5
+    words = shlex.split(made._command_line())
+    assert words[:3] == ["ngi", "render", "run=run"]
+    assert set(words[4:]) == {
+        "resolution=64", "scene=their scene", "exposure=1.5", "out=picture.png",
+    }  # fmt: skip
+
+
+def test_where_reset_view_leads_is_where_a_page_begins() -> None:
+    page = Page(studio(), subject(), resolution=64, host="127.0.0.1", port=0)
+    with closing(page):
+        camera = subject().camera
+        assert camera is not None
+        first = page._server.initial_camera
+        np.testing.assert_allclose((first.position, first.look_at), camera.view(START))
 
 
 def test_pictures_too_small_for_the_metrics_are_shown_without(browser: Browser) -> None:

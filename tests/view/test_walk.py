@@ -93,6 +93,63 @@ def test_a_slider_puts_it_back_after_a_mouse(browser: Browser, made: Visitor) ->
     assert made.wish.place.v == tuple(START)
 
 
+def test_a_mouse_that_comes_back_to_where_the_page_has_put_it_is_followed(
+    browser: Browser, made: Visitor
+) -> None:
+    put = browser.view
+    browser.says(*put)
+    browser.says(put[0] + 0.1, put[1])
+    assert made.wish.place.v != tuple(START)
+    browser.says(*precisely(put))
+    assert made.wish.place.v == tuple(START)
+
+
+def test_a_key_on_a_slider_moves_no_camera(browser: Browser, made: Visitor) -> None:
+    """Viser turns the camera by the arrows that Mantine moves its sliders by."""
+    put = browser.view
+    browser.says(*put)
+    lamp = len(START) - 1
+    set_slider(made, lamp, 0.5)
+    wanted = made.wish.place.v
+    assert wanted[:lamp] == tuple(START[:lamp])
+    browser.says(put[0] + 0.1, put[1])
+    assert made.wish.place.v == wanted
+    np.testing.assert_array_equal(browser.view, put)
+
+
+def test_a_slider_that_comes_back_before_the_browser_has_answered(
+    browser: Browser, made: Visitor
+) -> None:
+    first = browser.view
+    set_slider(made, 0, 1.0)
+    browser.says(*first, at=0.0)  # late: viser takes it for where the browser is
+    sent: list[np.ndarray] = []
+    browser.camera = Listening(sent, *first)  # type: ignore[assignment]
+    made._panel.reset()
+    np.testing.assert_array_equal(sent[-1], first[0])
+
+
+class Listening:
+    """A camera that drops what it believes to be so already, as viser's does."""
+
+    up_direction = None
+
+    def __init__(self, sent: list[np.ndarray], position: np.ndarray, look_at: np.ndarray) -> None:
+        self.look_at = look_at
+        self._position = position
+        self._sent = sent
+
+    @property
+    def position(self) -> np.ndarray:
+        return self._position
+
+    @position.setter
+    def position(self, position: np.ndarray) -> None:
+        if not np.allclose(position, self._position):
+            self._sent.append(position)
+        self._position = position
+
+
 def test_a_browser_that_never_gets_there_is_believed_in_the_end(
     browser: Browser, made: Visitor, monkeypatch: pytest.MonkeyPatch
 ) -> None:

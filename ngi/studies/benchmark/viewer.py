@@ -57,7 +57,10 @@ def _while_moving(name: str, component: int, made: Ours, *, seconds: float) -> l
     def shown(picture: Shown) -> None:
         pictures.append((monotonic(), picture.view.place))
 
-    studio.open(0, wish(0), shown)
+    def failed(error: Exception) -> None:
+        raise error
+
+    studio.open(0, wish(0), shown, failed)
     studio.work(wait=1)  # compiles
     with _moving(lambda moves: studio.change(0, wish(moves))):
         begin = monotonic() + WARM_UP
