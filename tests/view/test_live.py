@@ -122,6 +122,20 @@ def test_the_page_shows_runs_whose_samples_are_several_images(
     assert places == {"x": 0, "y": 1, "patch x": 10, "patch y": 11}
 
 
+def test_a_training_goes_on_when_its_picture_fails(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def broken(**_: Any) -> np.ndarray:
+        raise MemoryError
+
+    monkeypatch.setattr(Page, "visitors", 1)
+    monkeypatch.setattr(live, "training_figure", broken)
+    page = ("viewer=true", "run.viewer_port=0", "budget.steps=3")
+    train(run_config(*page, f"run.folder={tmp_path / 'run'}"))
+    assert (tmp_path / "run" / "result.json").exists()
+    assert "the page's picture of the training failed; the training goes on" in caplog.text
+
+
 def test_two_rotations_of_one_object_are_two_axes(tmp_path: Path) -> None:
     shutil.copytree(BOX, tmp_path / "box")
     text = (BOX / "scene.yaml").read_text().split("variables:")[0]
