@@ -124,7 +124,7 @@ def as_shown(difference: Estimate) -> str:
 
 def test_how_near_samplers_come_is_what_the_runs_say() -> None:
     folder = ROOT / "docs/exploration-ceiling"
-    small, scarce, quarter = rows_of(
+    small, scarce, quarter, hour = rows_of(
         "docs/exploration-ceiling/README.md", "How near samplers come"
     )[2:]
     for row, name in ((small, "runs.csv"), (scarce, "scarce_ceiling.csv")):
@@ -151,6 +151,27 @@ def test_how_near_samplers_come_is_what_the_runs_say() -> None:
     error = {run: of_it["hard_error"] for run, of_it in runs.groupby(["patches", "choice"])}
     for cell, run in zip(quarter, ((4096, "uniform"), (1792, "oracle")), strict=False):
         assert cell == as_shown(difference_of(error[1792, "uniform"], error[run]))
+
+    runs = pd.read_csv(folder / "hour.csv").set_index(["method", "scene", "seed"])
+    ends = geometric_mean(runs.groupby(level=[0, 1, 2]).last(), "hard")
+    assert hour[3] == as_shown(difference_of(ends["ours_uniform"], ends["ours_exploring"]))
+
+
+def test_what_chains_do_in_an_hour_is_what_the_runs_say() -> None:
+    runs = pd.read_csv(ROOT / "docs/exploration-ceiling/hour.csv").set_index(
+        ["method", "scene", "seed"]
+    )
+    rows = iter(rows_of("docs/exploration-ceiling/README.md", "An hour")[2:])
+    kinds = (("hard", ""), ("hard", "_worst5"), ("uniform", ""))
+    for scene, seed in product(("living-room", "veach-egg"), (0, 1)):
+        for frames, worst in kinds:
+            exploring, uniform = (
+                geometric_mean(runs.loc[(f"ours_{way}", scene, seed)], frames, worst)
+                for way in ("exploring", "uniform")
+            )
+            changes = [tenths(each) for each in exploring.to_numpy() / uniform.to_numpy() - 1]
+            shown = ["0.0" if change[1:] == "0.0" else change for change in changes]
+            assert next(rows) == [f"{change} %" for change in shown]
 
 
 def test_what_the_references_noise_hides_is_what_the_runs_say() -> None:
