@@ -41,6 +41,7 @@ class Recorder:
             for log in (self._run.folder.metrics, self._run.folder.target_maps):
                 log.keep_until(self._run.stream.counters.iteration - 1)
             evaluation = self._evaluator.evaluate(self._predict)
+            errors = evaluation.row()
             densities = None if self._target_map is None else self._target_map.measure()
         row: dict[str, Any] = {
             "step": self._run.stream.counters.iteration,
@@ -51,7 +52,7 @@ class Recorder:
             "paths_traced": self._run.stream.counters.paths_traced,
             "new_worst_share": self._run.stream.new_losses.worst_share,
             **usage(self._run.folder.path),
-            **evaluation.row(),
+            **errors,
         }
         self._run.folder.metrics.append(row)
         self._run.folder.metrics.flush()

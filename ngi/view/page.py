@@ -1,5 +1,6 @@
 """The web server whose page shows a network, to any number of browsers and to no other page."""
 
+import errno
 import logging
 import socket
 import warnings
@@ -20,6 +21,8 @@ from ngi.view.studio import Studio
 from ngi.view.subject import Subject
 from ngi.view.visitor import Visitor
 
+LAST_PORT = 2**16 - 1
+
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 Answer = Response | None
@@ -36,19 +39,41 @@ def viser_server(*, host: str, port: int, label: str | None = None) -> viser.Vis
     may differ). Bound to a loopback address, the name must be one too, so that no foreign name that
     resolves to it does. Programs that are no browsers give no origin and are let in.
 
-    Raises ValueError for a port that there is not and a host that is not this machine: viser would
-    wait for ever.
+    Raises ValueError as `check_address` does.
     """
-    if not 0 <= port < 2**16:
-        raise ValueError(f"port: {port}: give 0 to {2**16 - 1}")
-    try:
-        family, kind, protocol, _, address = socket.getaddrinfo(host, 0, type=socket.SOCK_STREAM)[0]
-        with socket.socket(family, kind, protocol) as probe:
-            probe.bind(address)
-    except OSError as error:
-        raise ValueError(f"host: {host}: no address of this machine: {error}") from error
+    check_address(host, port)
     with _checking_origins(host):
         return viser.ViserServer(host=host, port=port, label=label, verbose=False)
+
+
+def check_address(host: str, port: int) -> None:
+    """Raises ValueError where no server can be opened; Viser would wait for ever.
+
+    A port that is taken is no reason: Viser takes one of the next.
+    """
+    if not 0 <= port <= LAST_PORT:
+        raise ValueError(f"port: {port}: give 0 to {LAST_PORT}")
+    try:
+        flags = socket.AI_PASSIVE
+        found = socket.getaddrinfo(host or None, port, type=socket.SOCK_STREAM, flags=flags)
+    except OSError as error:
+        raise ValueError(f"host: {host}: no address of this machine: {error}") from error
+    for family, kind, protocol, _, address in found:
+        try:
+            probe = socket.socket(family, kind, protocol)
+        except OSError:  # of a kind that this machine lacks, as IPv6: asyncio leaves it out, too
+            continue
+        with probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            if family == socket.AF_INET6:
+                probe.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 1)
+            try:
+                probe.bind(address)
+            except OSError as error:
+                if error.errno != errno.EADDRINUSE or port == LAST_PORT:
+                    raise ValueError(
+                        f"host: {host}, port: {port}: cannot be opened: {error.strerror}"
+                    ) from error
 
 
 def is_own_page(origin: str | None, name: str | None, *, host: str) -> bool:

@@ -29,7 +29,8 @@ class Panel:
     buffers: names of those that can be shown
     on_change: called, in a thread of the browser's that holds `lock`, after anything was changed
 
-    `lock` is held while v changes; `touched` is when a control was last used, as `time.time()`.
+    `lock` is held while v changes; `touched` is when a slider or a setting was last used, in
+    seconds of `time.time()`.
     """
 
     def __init__(
@@ -154,12 +155,13 @@ class Panel:
             with self._gui.add_folder(group):
                 for each in members:
                     made = each.add(self._gui, self._v)
-                    made.on_update(lambda _, each=each, made=made: self._read(each, made.value))
+                    made.on_update(lambda _, each=each, made=made: self._read(each, made))
                     self._inputs.append((each, made))
 
-    def _read(self, changed: Input, value: Any) -> None:
+    def _read(self, changed: Input, made: Any) -> None:
         """Takes over what a user has set; what `set_v` has set says nothing new."""
         with self.lock:
+            value = made.value
             if value == changed.shown(self._v):
                 return
             for component, number in changed.components(value).items():

@@ -40,6 +40,7 @@ class Session:
         self._changed = -SETTLED
         self._shown: Wish | None = None
         self._previewed: Wish | None = None
+        self._failed: Wish | None = None
 
     @property
     def wish(self) -> Wish:
@@ -50,16 +51,19 @@ class Session:
         if wish != self._wish:
             self._wish = wish
             self._changed = now
+            self._failed = None
 
     def again(self) -> None:
         """What is shown is out of date: the network has changed, or the browser was lost."""
-        self._shown = self._previewed = None
+        self._shown = self._previewed = self._failed = None
 
     def next_job(self, *, now: float, samples: int) -> Job | None:
-        """The picture that is wanted most; None where all is shown.
+        """The picture that is wanted most; None where all is shown, or the last one failed.
 
         samples: per pixel that the wish's path-traced picture has.
         """
+        if self._failed == self._wish:
+            return None
         if self._shown == self._wish:
             more = self._wish.screen.traces_paths and samples < MOST_SAMPLES
             return Job(self._wish, more_paths=True) if more else None
@@ -77,6 +81,10 @@ class Session:
         """A job's picture is on its way to the browser."""
         self._shown = job.wish
         self._previewed = self._wish
+
+    def failed(self) -> None:
+        """The last job cannot be done: it is not tried again before something is changed."""
+        self._failed = self._previewed
 
 
 MOVING = 0.095

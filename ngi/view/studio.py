@@ -9,7 +9,7 @@ from functools import partial
 from time import monotonic
 
 from ngi.render import Renderer
-from ngi.view.scene_view import Place, Predict, SceneView
+from ngi.view.scene_view import PASS_SAMPLES, Place, Predict, SceneView
 from ngi.view.screen import Pixels
 from ngi.view.session import Job, Pace, Session, Wish
 
@@ -134,7 +134,7 @@ class Studio:
             self._browsers.move_to_end(turn.name)
             turn.browser.session.done(turn.job)
             full = turn.job.wish == turn.browser.session.wish
-            return partial(self._make, turn, full=full), turn.browser.failed
+            return partial(self._make, turn, full=full), partial(self._failed, turn.browser)
 
     def _make(self, turn: _Turn, *, full: bool) -> None:
         wish = turn.job.wish
@@ -144,6 +144,11 @@ class Studio:
         pixels = wish.screen.pixels(view)
         self._pace.measured(view)
         turn.browser.show(Shown(pixels, view, wish, full))
+
+    def _failed(self, browser: _Browser, error: Exception) -> None:
+        with self._changed:
+            browser.session.failed()
+        browser.failed(error)
 
     def _next(self) -> _Turn | None:
         """The job of the browser that has waited longest; new pictures before better ones."""
@@ -168,10 +173,10 @@ class Studio:
         return view
 
     def _forget(self) -> None:
-        """Views too many that no browser looks at, those with path-traced pictures last."""
+        """Views too many that no browser looks at; last those with more paths than a preview."""
         with self._changed:
             wanted = {browser.session.wish.place for browser in self._browsers.values()}
         spare = [place for place in self._views if place not in wanted]
-        spare.sort(key=lambda place: self._views[place].samples > 0)
+        spare.sort(key=lambda place: self._views[place].samples > PASS_SAMPLES)
         for place in spare[: max(0, len(self._views) - KEPT)]:
             del self._views[place]

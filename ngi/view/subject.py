@@ -12,12 +12,9 @@ from ngi.render import Renderer
 from ngi.scene import SceneDescription
 from ngi.scene.kinds import LookAt
 from ngi.view.inputs import Control, controls, unnamed_controls
+from ngi.view.targets import nearest_target
 
 Vector = NDArray[np.float64]
-
-ROUNDING = 1e-9
-NEAREST = 1e-3
-"""In lengths of a view's direction: no target is nearer to its origin, or behind it."""
 
 
 @dataclass(frozen=True)
@@ -43,34 +40,16 @@ class Camera:
         """Those components of v that come closest to a view; origin and target in world space.
 
         The target counts as a direction only, since a mouse that turns a camera does not say how
-        far away it looks. It is moved in this direction to where that comes closest to the middle
-        of its box: within the box, where the direction leads through it.
+        far away it looks: see `nearest_target`.
         """
         low, high = np.array(self.variable.minimum), np.array(self.variable.maximum)
         start = np.clip(np.asarray(origin, dtype=np.float64), low[:3], high[:3])
         direction = np.asarray(target, dtype=np.float64) - np.asarray(origin, dtype=np.float64)
-        along = _along(direction, low[3:] - start, high[3:] - start)
-        end = np.clip(start + along * direction, low[3:], high[3:])
+        end = start + nearest_target(direction, low[3:] - start, high[3:] - start)
         varied = low != high
         value = np.concatenate([start, end])[varied]
         components: Vector = np.clip((value - low[varied]) / (high - low)[varied], 0, 1)
         return components
-
-
-def _along(direction: Vector, low: Vector, high: Vector) -> float:
-    """How far to go, in lengths of `direction`, to come closest to the middle of a box.
-
-    direction, low, high: [3], from where it begins; in the box, if the way leads through it
-    """
-    moving = direction != 0
-    if not moving.any():
-        return 0.0
-    along = (low + high) / 2 @ direction / (direction @ direction)
-    walls = np.stack([low, high])[:, moving] / direction[moving]
-    enters, leaves = walls.min(axis=0).max(), walls.max(axis=0).min()
-    if enters <= leaves + ROUNDING:
-        along = np.clip(along, enters, leaves)
-    return max(float(along), NEAREST)
 
 
 def camera_of(description: SceneDescription) -> Camera | None:

@@ -75,8 +75,8 @@ class Visitor:
         self._panel.status.content = self._status(shown, sending=perf_counter() - begin)
 
     def failed(self, error: Exception) -> None:
-        """Tells why there is no picture."""
-        self._panel.status.content = f"This picture failed: {error}"
+        """Tells why there is no picture, or no file."""
+        self._panel.status.content = f"This failed: {error or type(error).__name__}"
 
     def _send(self, shown: Shown) -> None:
         self._last, self._aspect = shown, self._window()

@@ -1,5 +1,6 @@
 """Keeps a browser's camera where v has the scene's, and v where a mouse has moved that camera."""
 
+from threading import Timer
 from time import time
 
 import numpy as np
@@ -8,10 +9,12 @@ import viser
 from ngi.view.panel import Panel
 from ngi.view.subject import Camera, Vector
 
-PATIENCE = 5.0
+AGAIN = 0.5
+"""Seconds after which a browser is put again that has not said that it is there."""
+PATIENCE = 2.0
 """Seconds after which a browser is believed that never was exactly where the page has put it."""
-KEYSTROKE = 0.3
-"""Seconds after a control has changed in which the camera moves by the same key, not by a mouse."""
+KEYSTROKE = 1.0
+"""Seconds after a slider has moved in which a key that is held down turns the camera as well."""
 ASIDE = 0.01
 """Of the distance to the target."""
 
@@ -28,7 +31,8 @@ class Walk:
         self._panel = panel
         self._part: tuple[float, ...] | None = None  # of v, that the browser shows or soon will
         self._there = True  # whether the browser has been where it was put last
-        self._put_in = 0.0
+        self._put_in = self._waits_since = 0.0
+        self._insists = False
         self.follow()
         client.camera.on_update(self._moved)
 
@@ -40,11 +44,36 @@ class Walk:
 
     def _put(self) -> None:
         self._part = self._put_part = self._panel.v[self._camera.part]
-        self._view = origin, target = self._camera.view(self._panel.v)
+        self._view = self._camera.view(self._panel.v)
         mine = self._client.camera
         if self._there and _same_view((mine.position, mine.look_at), self._view):
             return
-        self._there, put = False, False
+        self._there = False
+        self._waits_since = time()
+        self._send()
+        if not self._insists:
+            self._later()
+
+    def _later(self) -> None:
+        self._insists = True
+        timer = Timer(AGAIN, self._insist)
+        timer.daemon = True
+        timer.start()
+
+    def _insist(self) -> None:
+        """A browser tells of the last of its frames only, and may have left where it was put."""
+        with self._panel.lock:
+            self._insists = False
+            self._there = self._there or time() > self._waits_since + PATIENCE
+            if self._there:
+                return
+            if time() >= self._put_in + AGAIN:
+                self._send()
+            self._later()
+
+    def _send(self) -> None:
+        mine, (origin, target) = self._client.camera, self._view
+        put = False
         while not put:  # again where a message in between has undone a part
             with self._client.atomic():
                 mine.up_direction = np.asarray(self._camera.up)
@@ -67,7 +96,7 @@ class Walk:
             view = (mine.position, mine.look_at)
             if _same_view(view, self._view):
                 self._there, part = True, self._put_part
-            elif not self._there and time() < self._put_in + PATIENCE:
+            elif not self._there:
                 return
             elif time() < self._panel.touched + KEYSTROKE:
                 self._put()

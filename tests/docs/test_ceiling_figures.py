@@ -172,6 +172,10 @@ def test_what_chains_do_in_an_hour_is_what_the_runs_say() -> None:
             changes = [tenths(each) for each in exploring.to_numpy() / uniform.to_numpy() - 1]
             shown = ["0.0" if change[1:] == "0.0" else change for change in changes]
             assert next(rows) == [f"{change} %" for change in shown]
+    tails = runs[["hard_tail", "uniform_tail"]].dropna().xs("veach-egg", level="scene")
+    less, more = 1 - tails.loc["ours_exploring"].iloc[0] / tails.loc["ours_uniform"].iloc[0]
+    said = f"has {100 * less:.1f} % less on hard frames and {-100 * more:.1f} % more on uniform"
+    assert said in (ROOT / "docs/exploration-ceiling/README.md").read_text()
 
 
 def test_what_the_references_noise_hides_is_what_the_runs_say() -> None:

@@ -216,8 +216,10 @@ def test_the_mouse_walks_the_camera_within_its_box(
         assert walked(page) == start  # which no message of the browser's had changed
         lamp = page.get_by_role("slider").last
         lamp.focus()
-        for _ in range(5):
-            lamp.press("ArrowRight", delay=200)
+        for wait in (600, *10 * (30,)):  # as a keyboard that repeats a key
+            page.keyboard.down("ArrowRight")
+            page.wait_for_timeout(wait)
+        page.keyboard.up("ArrowRight")
         page.wait_for_timeout(2000)
         assert walked(page)[-1] != start[-1]
         assert walked(page)[:-1] == start[:-1]  # viser turns the camera by these keys

@@ -48,7 +48,7 @@ def test_its_own_page_and_programs_are_let_in(port: int) -> None:
     [
         ("127.0.0.1", 80_000, "port: 80000: give 0 to 65535"),
         ("127.0.0.1", -1, "port: -1: give 0 to 65535"),
-        ("192.0.2.1", 8080, "host: 192.0.2.1: no address of this machine"),  # RFC 5737
+        ("192.0.2.1", 8080, "host: 192.0.2.1, port: 8080: cannot be opened"),  # RFC 5737
         ("no.such.name.invalid", 8080, "host: no.such.name.invalid: no address"),
     ],
 )

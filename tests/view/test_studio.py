@@ -33,8 +33,9 @@ def fail(error: Exception) -> None:
 
 def settled(studio: Studio) -> None:
     sleep(SETTLED)
-    while studio.work(wait=0):
-        pass
+    for _ in range(20):  # of path-traced pictures there are always better ones
+        if not studio.work(wait=0):
+            return
 
 
 def test_the_picture_is_the_one_computed_without_a_viewer() -> None:
@@ -160,18 +161,26 @@ def test_a_network_that_has_learnt_is_shown_again() -> None:
     assert pictures[1].view is pictures[0].view  # its buffers and paths are kept
 
 
-def test_a_picture_that_fails_is_told_and_the_next_one_made(
-    caplog: pytest.LogCaptureFixture,
+@pytest.mark.parametrize("show", ["network", "path tracer", "network | path tracer"])
+def test_a_picture_that_fails_is_told_once_and_the_next_one_made(
+    show: str, caplog: pytest.LogCaptureFixture
 ) -> None:
-    def broken(buffers: Tensor, scene_vector: Tensor) -> Tensor:
+    class Broken(AnalyticRenderer):
+        def image_buffers(self, v: Tensor, **options: int | None) -> Tensor:
+            return super().image_buffers(small_enough(v), **options)  # type: ignore[arg-type]
+
+        def render_image(self, v: Tensor, **options: int) -> Tensor:
+            return super().render_image(small_enough(v), **options)
+
+    def small_enough(scene_vector: Tensor) -> Tensor:
         if scene_vector[0] > 0.5:
             raise RuntimeError("out of memory")
-        return predict(buffers, scene_vector)
+        return scene_vector
 
     pictures: list[Shown] = []
     told: list[Exception] = []
-    studio = Studio(renderer=renderer(), predict=broken)
-    studio.open("a", Wish(Place((0.9, 0, 0), 32), Screen()), pictures.append, told.append)
+    studio = Studio(renderer=Broken(dimensions=3, patch_size=16), predict=predict)
+    studio.open("a", Wish(Place((0.9, 0, 0), 32), Screen(show)), pictures.append, told.append)
     settled(studio)
     assert [str(error) for error in told] == ["out of memory"]
     assert "a picture of the page failed" in caplog.text
@@ -179,6 +188,9 @@ def test_a_picture_that_fails_is_told_and_the_next_one_made(
     settled(studio)
     assert pictures[-1].full
     assert len(told) == 1
+    studio.change("a", Wish(Place((0.9, 0, 0), 32), Screen(show)))
+    settled(studio)
+    assert len(told) == 2  # tried again, once
 
 
 def test_errands_are_done_where_pictures_are_made() -> None:
@@ -212,17 +224,18 @@ def test_what_one_browser_looks_at_another_does_not_push_out() -> None:
     studio.work(wait=0)
     traced = Place((0.1, 0.1, 0.1), 32)
     studio.open("b", Wish(traced, Screen("path tracer")), [].append, fail)
-    studio.work(wait=0)
+    while studio._views.get(traced) is None or studio._views[traced].samples <= PASS_SAMPLES:
+        studio.work(wait=0)
     for step in range(2 * KEPT):
         studio.open("b", Wish(Place((step / 99, 0, 0), 32), Screen()), [].append, fail)
         studio.work(wait=0)
     assert len(studio._views) == KEPT
     assert seen in studio._views
     assert traced in studio._views  # which is dearer than pictures of the network
-    before = clean[-1].view
+    before, samples = clean[-1].view, clean[-1].view.samples
     studio.work(wait=0)
     assert clean[-1].view is before
-    assert before.samples == 2 * PASS_SAMPLES
+    assert before.samples == samples + PASS_SAMPLES
 
 
 def test_only_some_views_are_kept() -> None:

@@ -1,5 +1,7 @@
 """What a browser says of its camera: what a mouse has done, and what it tells late."""
 
+from collections.abc import Callable
+from time import monotonic, sleep
 from typing import Any
 
 import numpy as np
@@ -15,7 +17,9 @@ ELSEWHERE = (np.array([3.0, 3.0, 3.0]), np.zeros(3))
 
 
 @pytest.fixture
-def made(browser: Browser) -> Visitor:
+def made(browser: Browser, monkeypatch: pytest.MonkeyPatch) -> Visitor:
+    monkeypatch.setattr(walk, "AGAIN", 600.0)
+    monkeypatch.setattr(walk, "KEYSTROKE", 600.0)
     return visitor(browser)
 
 
@@ -104,7 +108,9 @@ def test_a_mouse_that_comes_back_to_where_the_page_has_put_it_is_followed(
     assert made.wish.place.v == tuple(START)
 
 
-def test_a_key_on_a_slider_moves_no_camera(browser: Browser, made: Visitor) -> None:
+def test_a_key_on_a_slider_moves_no_camera(
+    browser: Browser, made: Visitor, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Viser turns the camera by the arrows that Mantine moves its sliders by."""
     put = browser.view
     browser.says(*put)
@@ -115,6 +121,10 @@ def test_a_key_on_a_slider_moves_no_camera(browser: Browser, made: Visitor) -> N
     browser.says(put[0] + 0.1, put[1])
     assert made.wish.place.v == wanted
     np.testing.assert_array_equal(browser.view, put)
+    browser.says(*put)
+    monkeypatch.setattr(walk, "KEYSTROKE", 0.0)  # long ago
+    browser.says(put[0] + 0.1, put[1])
+    assert made.wish.place.v != wanted
 
 
 def test_a_slider_that_comes_back_before_the_browser_has_answered(
@@ -150,12 +160,28 @@ class Listening:
         self._position = position
 
 
-def test_a_browser_that_never_gets_there_is_believed_in_the_end(
-    browser: Browser, made: Visitor, monkeypatch: pytest.MonkeyPatch
+def test_a_browser_that_never_gets_there_is_put_again_and_believed_in_the_end(
+    browser: Browser, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(walk, "PATIENCE", 0.0)
+    monkeypatch.setattr(walk, "AGAIN", 0.02)
+    monkeypatch.setattr(walk, "PATIENCE", 0.3)
+    made = visitor(browser)
+    put = browser.view
+    browser.says(*ELSEWHERE)
+    wait_until(lambda: np.array_equal(browser.view, put))
+    assert made.wish.place.v == tuple(START)
+    walking = made._walk
+    assert walking is not None
+    wait_until(lambda: walking._there)
     browser.says(*ELSEWHERE)
     assert made.wish.place.v != tuple(START)
+
+
+def wait_until(holds: Callable[[], bool]) -> None:
+    deadline = monotonic() + 60
+    while not holds():
+        assert monotonic() < deadline
+        sleep(0.01)
 
 
 class Jostled:
