@@ -22,6 +22,7 @@ from analysis.verdicts import ClaimResult
 SHOWN_BESIDE = "shown beside"
 """Instead of a verdict where a comparison decides nothing about its claim."""
 
+_METRIC_TITLES = tuple(TITLES[metric] for metric in METRICS)
 _COLUMNS = ("difference", "g", "verdict", "time", "seeds", "seeds needed")
 
 
@@ -74,10 +75,18 @@ def main_evidence(result: ClaimResult) -> list[EvidenceLine]:
         compared += [_of_comparison(item) for item in pooled or of_pair]
     primary_finds = result.claim.primary == "finding"
     evidence = [*findings, *compared] if primary_finds else [*compared, *findings]
-    if evidence and (findings if primary_finds else compared):
+    if findings if primary_finds else _is_primary(result):
         evidence[0] = replace(evidence[0], test="primary")
     deciding = [line for line in evidence if line.verdict != SHOWN_BESIDE]
     return deciding or evidence
+
+
+def _is_primary(result: ClaimResult) -> bool:
+    """Whether the first comparison that has runs is the claim's first, and decides."""
+    if not result.comparisons:
+        return False
+    found, wanted = result.comparisons[0], result.claim.comparisons[0]
+    return found.decides and (found.better, found.worse) == (wanted.better, wanted.worse)
 
 
 def _of_comparison(item: ComparisonResult) -> EvidenceLine:
@@ -119,7 +128,7 @@ def effects_table(result: ClaimResult) -> Table:
         _row(item, *_of_comparison(item).cells, *_differences(item, "hard", ""))
         for item in result.comparisons
     )
-    columns = ("scene", "compared", "all metrics", *_COLUMNS[1:], *TITLES.values())
+    columns = ("scene", "compared", "all metrics", *_COLUMNS[1:], *_METRIC_TITLES)
     caption = f"{result.claim.title}: difference of the error on hard frames"
     return Table(caption, columns, rows, 2)
 
@@ -129,7 +138,7 @@ def further_effects_table(result: ClaimResult, set_name: str, suffix: str) -> Ta
     rows = tuple(_row(item, *_differences(item, set_name, suffix)) for item in result.comparisons)
     frames = f"{set_name} frames" + (", worst 5 %" if suffix else "")
     caption = f"{result.claim.title}: difference of the error on {frames}"
-    return Table(caption, ("scene", "compared", *TITLES.values()), rows, 2)
+    return Table(caption, ("scene", "compared", *_METRIC_TITLES), rows, 2)
 
 
 def _row(item: ComparisonResult, *texts: str) -> tuple[Cell, ...]:

@@ -24,13 +24,15 @@ class Comparison:
     """`better` is claimed to have less error than `worse` after the same time, on every scene.
 
     better, worse: options of the configuration group `method`. decides: whether the claim's
-    verdict depends on it; otherwise it is shown beside the claim.
+    verdict depends on it; otherwise it is shown beside the claim. reuse: of the group `reuse`, that
+    both methods were run with; None for any, the same for both.
     """
 
     scenes: tuple[str, ...]
     better: str
     worse: str
     decides: bool = True
+    reuse: str | None = None
 
 
 @dataclass(frozen=True)
@@ -122,7 +124,7 @@ _OF_THE_PAPER = (
         "starts to follow the target function after a burn-in, and the figure's reflection "
         "appears much sooner than with uniform sampling.",
         source="Sec. 5.1; Fig. 6",
-        comparisons=(Comparison(("mirror",), "active_exploration", "uniform"),),
+        comparisons=(Comparison(("mirror",), "active_exploration", "uniform", reuse="never"),),
         test="The distance between histogram and target map falls from the first to the last "
         "third of the run, for greedy acceptance and for Metropolis, by more than for uniform "
         "sampling.",

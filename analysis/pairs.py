@@ -38,8 +38,9 @@ def runs_of_one_way(runs: Sequence[Run], scene: str, *methods: str) -> dict[str,
 
     A way is what was chosen beside the method. Runs of two ways are never mixed: what a further
     override does is no difference between methods, and no scatter between seeds. Of the ways that
-    all these methods were run in, that with the fewest overrides counts, of several of these the
-    first in the alphabet; `ways_left_out` says which others there are.
+    all these methods were run in, that counts in which they share most seeds, of several of these
+    that with the fewest overrides, then the first in the alphabet; `ways_left_out` says which
+    others there are.
     """
     by_way: dict[tuple[str, ...], dict[str, dict[int, Run]]] = {}
     for run in runs:
@@ -47,7 +48,14 @@ def runs_of_one_way(runs: Sequence[Run], scene: str, *methods: str) -> dict[str,
         if run.scene == scene and method in methods:
             by_way.setdefault(_way(run), {}).setdefault(method, {})[run.seed] = run
     shared = [way for way, found in by_way.items() if len(found) == len(set(methods))]
-    return by_way[min(shared, key=lambda way: (len(way), way))] if shared else {}
+    if not shared:
+        return {}
+    return by_way[min(shared, key=lambda way: (-_pairs(by_way[way]), len(way), way))]
+
+
+def _pairs(by_method: Mapping[str, Mapping[int, Run]]) -> int:
+    """Seeds that all methods have."""
+    return len(set.intersection(*(set(by_seed) for by_seed in by_method.values())))
 
 
 def ways_left_out(runs: Sequence[Run]) -> list[str]:
@@ -59,7 +67,7 @@ def ways_left_out(runs: Sequence[Run]) -> list[str]:
     return [
         f"{scene}: {method} was run in {len(found)} ways "
         f"({'; '.join(' '.join(way) for way in sorted(found, key=lambda w: (len(w), w)))}); claims "
-        "are judged by runs of one way alone, that with the fewest overrides that the methods share"
+        "are judged by runs of one way alone, that in which the methods share most seeds"
         for (scene, method), found in sorted(ways.items())
         if len(found) > 1
     ]

@@ -61,14 +61,18 @@ def errors_of(runs: Sequence[Run]) -> pd.DataFrame:
 def errors_by_part(results: pd.DataFrame, whole: str) -> pd.DataFrame:
     """[parts, scenes and seeds] errors, the first row those of the whole method, named ''.
 
-    Geometric means of the four metrics on hard frames; NaN where a run is missing. Parts are
-    ordered by their effect over all scenes, those that lower the error most by being there first.
+    Geometric means on hard frames of the metrics that all runs have; NaN where a run is missing.
+    Parts are ordered by their effect over all scenes, those that lower the error most by being
+    there first.
 
     results: as from `errors_of`; scenes and seeds without the whole method, or without any part of
     it, are left out
     """
     prefix, _ = ABLATIONS[whole]
-    error = np.exp(np.log(results[[f"hard_{metric}" for metric in METRICS]]).mean(axis=1))
+    metrics = results[[f"hard_{metric}" for metric in METRICS]]
+    lacking = metrics.isna() & metrics.notna().any(axis=1).to_numpy()[:, None]
+    metrics = metrics.loc[:, ~lacking.any()]  # without weights of LPIPS, which then nobody has
+    error = np.exp(np.log(metrics).mean(axis=1))
     methods = results["method"].replace(OTHER_NAMES)
     parts = methods.str.removeprefix(f"{prefix}/").mask(methods == whole, "")
     named = methods.eq(whole) | methods.str.startswith(f"{prefix}/")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -67,9 +68,16 @@ def time_ratio(pairs: Sequence[Pair]) -> TimeRatio | None:
 
 
 def time_ratio_over_scenes(ratios: Sequence[TimeRatio | None]) -> TimeRatio | None:
-    """The geometric mean over scenes; None where one is missing."""
-    known = [(math.log(ratio.value), ratio.bound) for ratio in ratios if ratio is not None]
-    return _combine(known) if len(known) == len(ratios) else None
+    """The geometric mean over scenes; None where one is missing.
+
+    Without an interval where a scene has none: one seed shows what happened once in each.
+    """
+    known = [ratio for ratio in ratios if ratio is not None]
+    if len(known) < len(ratios):
+        return None
+    mean = _combine([(math.log(ratio.value), ratio.bound) for ratio in known])
+    once = any(ratio.low is None for ratio in known)
+    return replace(mean, low=None, high=None) if mean is not None and once else mean
 
 
 def _of_pair(pair: Pair) -> tuple[float, Bound] | None:

@@ -46,6 +46,11 @@ class Table:
     rows: tuple[tuple[Cell, ...], ...]
     labels: int
 
+    def __post_init__(self) -> None:
+        for row in self.rows:
+            if len(row) != len(self.columns):
+                raise ValueError(f"{self.title}: {len(row)} cells below {len(self.columns)} titles")
+
 
 def error_table(summaries: Sequence[Summary], sets: Sequence[str] = SETS) -> Table:
     """Mean metrics with intervals and the reference noise; the scene's best mean is marked."""

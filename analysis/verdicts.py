@@ -67,6 +67,8 @@ def _of_all_scenes(comparison: Comparison, results: Sequence[ComparisonResult]) 
 
 def _compare(comparison: Comparison, runs: Sequence[Run]) -> list[ComparisonResult]:
     """Per scene that was run, and where there are several, over all of them."""
+    if comparison.reuse is not None:
+        runs = [run for run in runs if run.label["reuse"] == comparison.reuse]
     found = [
         compare_on_scene(runs, scene, comparison.better, comparison.worse)
         for scene in comparison.scenes

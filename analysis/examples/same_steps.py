@@ -13,9 +13,12 @@ import pandas as pd
 
 from analysis import load_runs
 from analysis.effects import paired_effect
+from analysis.runs import METRICS
 
 evaluations = load_runs(sys.argv[1] if len(sys.argv) > 1 else "outputs/demo").evaluations
-of_hard_frames = evaluations.query("statistic == 'mean' and set == 'hard' and step > 0")
+of_hard_frames = evaluations[evaluations["metric"].isin(METRICS)].query(
+    "statistic == 'mean' and set == 'hard' and step > 0"
+)
 scenes = sys.argv[2:] or sorted(of_hard_frames["scene"].unique())
 
 # %% Mean logarithm of the metrics: a column per method, scene and seed, a row per step

@@ -103,7 +103,7 @@ def fail(error: Exception, *, job: str) -> NoReturn:
     A single one ends the process. Jobs of a sweep leave that to Hydra, which lets the others run
     and reports only the first that has failed: each says for itself what was wrong.
     """
-    message = _message(error)
+    message = in_plain_words(error)
     log.error("%s", message)
     log.debug("traceback", exc_info=True)
     if HydraConfig.get().mode is RunMode.RUN:
@@ -112,7 +112,7 @@ def fail(error: Exception, *, job: str) -> NoReturn:
     raise CompactHydraException(f"{job} failed: {what}") from error
 
 
-def _message(error: Exception) -> str:
+def in_plain_words(error: Exception) -> str:
     """Without the class that could not be made, with the part of the configuration it is for."""
     cause = error.__cause__
     if not (isinstance(error, InstantiationException) and isinstance(cause, TOLD)):

@@ -23,6 +23,7 @@ from hydra.experimental.callback import Callback
 from omegaconf import DictConfig
 from omegaconf.errors import OmegaConfBaseException
 
+from ngi.config.hydra_program import in_plain_words
 from ngi.config.sweep_plan import (
     Planned,
     counted,
@@ -118,7 +119,8 @@ def _failure(job: JobReturn) -> str | None:
         return None
     error = job._return_value  # `return_value` would raise it
     cause = error.__cause__ or error
-    return (str(cause).splitlines() or [type(cause).__name__])[0]
+    said = in_plain_words(cause) if isinstance(cause, Exception) else str(cause)
+    return (said.splitlines() or [type(cause).__name__])[0]
 
 
 def _planned(config: DictConfig) -> list[Planned]:

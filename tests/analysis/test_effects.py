@@ -135,6 +135,9 @@ def test_only_runs_made_in_the_same_way_are_paired(make_method, tmp_path) -> Non
     assert compare(tmp_path).decisive.effect_percent == pytest.approx(0, abs=5)
     make_method("uniform", overrides="method=uniform")
     assert compare(tmp_path).decisive.effect_percent == pytest.approx(-50, abs=5)
+    for method in ("active_exploration", "uniform"):  # of most seeds
+        make_method(method, overrides=f"loss.l1_weight=2,method={method}", seed=1)
+    assert compare(tmp_path).decisive.effect_percent == pytest.approx(0, abs=5)
 
 
 def spoil(frame: int, value: float):  # type: ignore[no-untyped-def]

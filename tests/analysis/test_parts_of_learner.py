@@ -56,6 +56,18 @@ def test_parts_are_compared_with_the_whole_that_they_belong_to() -> None:
     ]
 
 
+def test_a_metric_that_a_run_lacks_counts_for_none() -> None:
+    results = ablation()
+    results["hard_lpips"] *= 10
+    results.loc[results["method"] == "ours_without/small_steps", "hard_lpips"] = np.nan
+    found = effect(errors_by_part(results, "ours"), "small_steps")
+    without = effect(
+        errors_by_part(results.drop(columns="hard_lpips").assign(hard_lpips=np.nan), "ours"),
+        "small_steps",
+    )
+    assert found == without
+
+
 def test_effects_are_paired_by_scene_and_seed() -> None:
     errors = errors_by_part(ablation(), "ours")
     found = effect(errors, "big_steps")

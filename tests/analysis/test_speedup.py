@@ -86,7 +86,10 @@ def test_evaluations_that_failed_are_left_out(ratio, bad) -> None:
 
 def test_scenes_are_averaged_geometrically() -> None:
     two, eight = (TimeRatio(value, None, None, "") for value in (2.0, 8.0))
-    assert time_ratio_over_scenes([two, eight]).value == pytest.approx(4.0)
+    assert time_ratio_over_scenes([two, eight]) == TimeRatio(pytest.approx(4.0), None, None, "")
+    seeds = [TimeRatio(ratio.value, 1.0, 9.0, "") for ratio in (two, eight)]
+    assert time_ratio_over_scenes(seeds).low < 4 < time_ratio_over_scenes(seeds).high
+    assert time_ratio_over_scenes([two, seeds[1]]).low is None
     assert time_ratio_over_scenes([two, None]) is None
     bounded = time_ratio_over_scenes([two, TimeRatio(8.0, None, None, "at least")])
     assert (bounded.bound, bounded.low) == ("at least", None)

@@ -23,6 +23,11 @@ from analysis.tables import (
 )
 
 
+def test_a_row_has_a_cell_below_every_title() -> None:
+    with pytest.raises(ValueError, match="results: 1 cells below 2 titles"):
+        Table("results", ("scene", "MAPE"), ((Cell("mirror"),),), 1)
+
+
 @pytest.fixture
 def summaries(make_run, tmp_path):  # type: ignore[no-untyped-def]
     for seed in range(3):

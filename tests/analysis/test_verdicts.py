@@ -174,6 +174,27 @@ def test_the_primary_test_alone_refutes(make_method, tmp_path) -> None:
     assert [row[1].text for row in lines] == ["primary", "further"]
 
 
+def test_a_further_test_without_the_primary_one_is_no_primary_one(make_method, tmp_path) -> None:
+    for seed in range(3):
+        make_method("uniform", seed=seed, error=0.1)
+        make_method("uniform_growing", seed=seed, error=0.05)
+    result = judged(tmp_path)["resolution"]
+    (comparison,) = result.comparisons
+    assert (comparison.better, comparison.verdict) == ("uniform", Verdict.NOT_REPRODUCED)
+    assert result.verdict is Verdict.INCONCLUSIVE
+    assert [row[1].text for row in claims_table([result]).rows] == ["further"]
+
+
+def test_a_claim_of_runs_without_reuse_is_judged_by_these(make_method, tmp_path) -> None:
+    for seed in range(3):
+        for method, error in (("active_exploration", 0.05), ("uniform", 0.1)):
+            make_method(method, scene="mirror", seed=seed, error=error, reuse="never")
+            make_method(method, scene="mirror", seed=seed + 3, error=0.1)
+    (comparison,) = judged(tmp_path)["histogram"].comparisons
+    assert comparison.decisive.seeds == 3
+    assert comparison.decisive.effect_percent == pytest.approx(-50, abs=5)
+
+
 def test_a_claim_with_both_parts(make_method, tmp_path) -> None:
     resolution(make_method, growing=0.13)
     assert judged(tmp_path)["resolution"].verdict is Verdict.REPRODUCED

@@ -76,6 +76,13 @@ def test_in_the_end_it_says_what_failed_and_why(finished: tuple[Path, str]) -> N
     assert not [*folder.rglob(".sweep-*")]
 
 
+def test_of_what_could_not_be_made_it_says_why_as_the_run_does(tmp_path: Path) -> None:
+    status, output = sweep(tmp_path, "seed=0", "budget.steps=null", "budget.seconds=null")
+    assert status == 1
+    (line,) = output[output.index("1 run of this sweep failed:") :].splitlines()[1:]
+    assert "budget.steps and budget.seconds are both null" in line
+
+
 def test_notes_that_a_killed_sweep_left_are_not_of_the_next_with_its_process_number(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
