@@ -126,6 +126,7 @@ def _train(config: DictConfig, run: learn.Run, *, closing: ExitStack) -> dict[st
 
 def _trainer(config: DictConfig, run: learn.Run, callbacks: list[Callback]) -> Trainer:
     from ngi import learn
+    from ngi.learn.lightning_api import LightningEnvironment
 
     checkpoints = learn.AtomicCheckpointIO(
         identity=run.folder.identity, previous=run.folder.previous_checkpoint
@@ -134,7 +135,7 @@ def _trainer(config: DictConfig, run: learn.Run, callbacks: list[Callback]) -> T
         default_root_dir=run.folder.path,
         max_steps=run.budget.maximum_steps,
         callbacks=callbacks,
-        plugins=[checkpoints],
+        plugins=[checkpoints, LightningEnvironment()],  # Slurm's would save within a step
     )
     return trainer
 

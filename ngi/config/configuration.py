@@ -24,11 +24,18 @@ LONGEST = 100
 """Characters; longer names are cut, and told apart by a hash."""
 
 
-def run_name(overrides: str | None) -> str:
-    """'sampler=uniform,model.hidden_features=64' as a folder name; 'default' for no override."""
+def said_overrides(overrides: str | None) -> str:
+    """'sampler=uniform,model.hidden_features=64' in a folder's letters; 'default' for no override.
+
+    Of any length: by these words runs made in one way are told from others.
+    """
     name = re.sub(r"[^\w.,=+-]+", "_", (overrides or "").replace("+", "")).strip("_,")
-    if not name:
-        return "default"
+    return name or "default"
+
+
+def run_name(overrides: str | None) -> str:
+    """The same as a folder name, cut where it is too long for one."""
+    name = said_overrides(overrides)
     if len(name) <= LONGEST:
         return name
     return f"{name[:LONGEST]}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"
@@ -62,6 +69,7 @@ NOT_IDENTITY = (
 
 RESOLVERS: dict[str, Callable[..., Any]] = {
     "run_name": run_name,
+    "said_overrides": said_overrides,
     "run_group": run_group,
     "fast_precision": fast_precision,
     "network_width": network_width,

@@ -4,6 +4,7 @@ import hashlib
 import json
 from dataclasses import asdict, dataclass
 
+import torch
 from torch import Tensor
 from torch.quasirandom import SobolEngine
 
@@ -115,7 +116,8 @@ def evaluation_frames(renderer: Renderer, protocol: EvaluationProtocol) -> tuple
     """The scene's hard frames (paper, Sec. 7.2.1), then the low-discrepancy set.
 
     The latter are the first points of a scrambled Sobol sequence over [0, 1]^D: they stand for the
-    mean over all configurations, which the hard frames of a path do not.
+    mean over all configurations, which the hard frames of a path do not. Of more variables than
+    there are Sobol sequences for (21,201) they are independent.
     Raises ValueError for hard frames whose length is not the scene's D.
     """
     hard = renderer.hard_frames()
@@ -124,10 +126,18 @@ def evaluation_frames(renderer: Renderer, protocol: EvaluationProtocol) -> tuple
             f"hard frames of shape {list(hard.shape)}: the scene has {renderer.dimensions} "
             f"variables, so [n, {renderer.dimensions}] is expected"
         )
-    engine = SobolEngine(renderer.dimensions, scramble=True, seed=protocol.sobol_seed)
-    uniform = engine.draw(protocol.low_discrepancy_frames)
+    uniform = _spread(
+        protocol.low_discrepancy_frames, renderer.dimensions, seed=protocol.sobol_seed
+    )
     return tuple(
         Frame(set=name, index=index, scene_vector=v.detach().cpu().float())
         for name, vectors in (("hard", hard), ("uniform", uniform))
         for index, v in enumerate(vectors)
     )
+
+
+def _spread(count: int, dimensions: int, *, seed: int) -> Tensor:
+    """[count, dimensions] in [0, 1]."""
+    if dimensions > SobolEngine.MAXDIM:
+        return torch.rand(count, dimensions, generator=torch.Generator().manual_seed(seed))
+    return SobolEngine(dimensions, scramble=True, seed=seed).draw(count)

@@ -41,29 +41,31 @@ class Recorder:
             for log in (self._run.folder.metrics, self._run.folder.target_maps):
                 log.keep_until(self._run.stream.counters.iteration - 1)
             evaluation = self._evaluator.evaluate(self._predict)
-            errors = evaluation.row()
             densities = None if self._target_map is None else self._target_map.measure()
-        row: dict[str, Any] = {
-            "step": self._run.stream.counters.iteration,
-            "run_seconds": self._run.run_clock.run_seconds,
-            "wall_seconds": self._run.clock.run_seconds,
-            **{f"{name}_seconds": value for name, value in self._run.run_clock.seconds.items()},
-            "patches_traced": self._run.stream.counters.patches_traced,
-            "paths_traced": self._run.stream.counters.paths_traced,
-            "new_worst_share": self._run.stream.new_losses.worst_share,
-            **usage(self._run.folder.path),
-            **errors,
-        }
-        self._run.folder.metrics.append(row)
-        self._run.folder.metrics.flush()
-        if densities is not None:
-            self._run.folder.target_maps.append(
-                {"step": row["step"], "run_seconds": row["run_seconds"], **densities}
-            )
-            self._run.folder.target_maps.flush()
+            measured = {**usage(self._run.folder.path), **evaluation.row()}
+        row = {**self._progress(), **measured}
         with self._run.clock.phase("evaluate"):
+            self._run.folder.metrics.append(row)
+            self._run.folder.metrics.flush()
+            if densities is not None:
+                self._run.folder.target_maps.append(
+                    {"step": row["step"], "run_seconds": row["run_seconds"], **densities}
+                )
+                self._run.folder.target_maps.flush()
             self._run.tracker.evaluated(row, evaluation)
         return evaluation
+
+    def _progress(self) -> dict[str, Any]:
+        run_clock, clock, stream = self._run.run_clock, self._run.clock, self._run.stream
+        return {
+            "step": stream.counters.iteration,
+            "run_seconds": run_clock.run_seconds,
+            "wall_seconds": clock.run_seconds,
+            **{f"{name}_seconds": value for name, value in run_clock.seconds.items()},
+            "patches_traced": stream.counters.patches_traced,
+            "paths_traced": stream.counters.paths_traced,
+            "new_worst_share": stream.new_losses.worst_share,
+        }
 
     def finish(self) -> dict[str, Any]:
         """The last evaluation, with pictures; writes and returns the result."""

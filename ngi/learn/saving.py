@@ -11,7 +11,8 @@ from tqdm import tqdm
 
 from ngi.files.durable import DamagedError, write_atomically
 from ngi.learn.checkpoint import DECAYS_FROM, STREAM, read_checkpoint
-from ngi.learn.lightning_api import Callback, LightningModule, Trainer
+from ngi.learn.interruption import Interrupted
+from ngi.learn.lightning_api import Callback, LightningModule, SIGTERMException, Trainer
 from ngi.learn.outcome import Outcome
 from ngi.learn.run import Run
 
@@ -21,7 +22,9 @@ log = logging.getLogger(__name__)
 class BudgetAndCheckpoint(Callback):
     """Shows progress, saves a checkpoint every so often, and ends the run when the budget is spent.
 
-    A signal that was deferred ends it after this step, with a checkpoint.
+    A signal that was deferred ends it after this step, with a checkpoint. What else ends it, as the
+    signals that Submitit exits by, may come within a step, which no checkpoint can hold: it goes on
+    from the one before.
 
     Once the learning rate's schedule depends on how long the run is to be, the checkpoint of that
     step is kept too: a longer run goes on from it. The first step may be such a one; then there is
@@ -90,7 +93,7 @@ class BudgetAndCheckpoint(Callback):
             return  # nothing is trained yet
         self._close()
         step = self._run.stream.counters.iteration
-        if isinstance(exception, SystemExit):  # a deferred signal: the step is complete
+        if isinstance(exception, Interrupted | SIGTERMException):  # between two steps
             if self._saved_step < step:
                 self._save(trainer)
             log.warning("%s: interrupted, and saved at step %d", self._run.folder.path, step)

@@ -121,10 +121,11 @@ class StepGuard:
         self._log_norm: float | None = None  # average of the logarithms
 
     def state_dict(self) -> dict[str, Any]:
-        return {"log_norm": self._log_norm}
+        return {"log_norm": self._log_norm, "in_a_row": self._in_a_row}
 
     def load_state_dict(self, state_dict: dict[str, Any]) -> None:
         self._log_norm = state_dict["log_norm"]
+        self._in_a_row = state_dict["in_a_row"]
 
     def admits(self, attempt: Attempt) -> bool:
         """Whether the step is one to be taken, with its gradient as it is."""

@@ -259,7 +259,13 @@ class MitsubaRenderer(Renderer):
                 f"{path}: the camera is a {sensor.class_name()}; make it <sensor "
                 "type='perspective'>: rays all begin in one point here"
             )
-        width, height = sensor.film().size()
+        film = sensor.film()
+        width, height = film.size()
+        if [*film.crop_size(), *film.crop_offset()] != [width, height, 0, 0]:
+            raise ValueError(
+                f"{path}: the film shows a part of its picture; take crop_width, crop_height, "
+                "crop_offset_x and crop_offset_y out"
+            )
         if width != height:
             raise ValueError(
                 f"{path}: the film is {width} x {height}; make width and height equal, since the "

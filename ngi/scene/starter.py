@@ -184,4 +184,6 @@ def _bounds(scene: mi.Scene) -> tuple[list[float], list[float]]:
 
 
 def _list(values: object) -> str:
-    return "[" + ", ".join(f"{float(x):.4g}" for x in np.ravel(np.array(values))) + "]"
+    numbers = (float(f"{x:.4g}") for x in np.ravel(np.array(values, dtype=np.float64)))
+    # without exponents, which YAML reads as text where they lack a point or a sign
+    return "[" + ", ".join(np.format_float_positional(x, trim="-") for x in numbers) + "]"

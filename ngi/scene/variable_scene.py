@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
@@ -124,6 +125,14 @@ class VariableScene:
         Only what changed since the last v is written, so that an unmoved shape is never rebuilt.
         """
         values = self.description.values(scene_vector)
+        try:
+            self._write(values)
+        except BaseException:  # part of it is there, and Mitsuba may not know
+            self._values = [None] * len(self._values)
+            self.changes += 1
+            raise
+
+    def _write(self, values: Sequence[NDArray[np.float64]]) -> None:
         changed = False
         for i, (write, value) in enumerate(zip(self._writes, values, strict=True)):
             present = self._values[i]

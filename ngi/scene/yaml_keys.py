@@ -64,7 +64,9 @@ class YamlKeys:
         value = self.take(key, object)
         numbers = value if isinstance(value, list) else [value]
         if len(numbers) != length or not all(map(_is_finite_number, numbers)):
-            raise self.error(key, value, f"expected {length} finite number(s)")
+            text = any(isinstance(number, str) and _is_number(number) for number in numbers)
+            hint = "; YAML reads 1e5 as text: write 1.0e+5" if text else ""
+            raise self.error(key, value, f"expected {length} finite number(s){hint}")
         return tuple(map(float, numbers))
 
     def flag(self, key: str) -> bool:
@@ -119,6 +121,14 @@ class YamlKeys:
             near = get_close_matches(str(key), sorted(self.taken), n=1)
             advice = f"did you mean '{near[0]}'?" if near else f"known are {sorted(self.taken)}"
             raise ValueError(f"{self.path}: unknown key '{self.prefix}{key}'; {advice}")
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _is_finite_number(value: object) -> bool:

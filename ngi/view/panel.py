@@ -1,5 +1,6 @@
 """The sliders, switches and menus of one browser."""
 
+import html
 import json
 import random
 from collections.abc import Callable, Sequence
@@ -16,6 +17,8 @@ from ngi.view.screen import CURVES, PARTS, Screen
 
 RESOLUTIONS = ("64", "128", "256", "384", "512", "768", "900")
 CHOOSE = "choose …"
+STATUS = "height: 7em; overflow-y: auto; padding: 0 1em; font-size: 0.85em; line-height: 1.4"
+"""Of what is said: a click that falls while a button moves is lost."""
 MOST_SLIDERS = 200
 """More variables than that are set by presets alone: a browser draws every slider."""
 
@@ -54,7 +57,8 @@ class Panel:
         self._epsilon = epsilon
         self._on_change = on_change
         self._inputs: list[tuple[Input, Any]] = []
-        self.status = gui.add_markdown("…")
+        self._status = gui.add_html("")
+        self.say(["…"])
         self._error_scale = gui.add_image(
             error_colours(256, 12),
             label=f"|error| / (reference + {epsilon:g}), from 0 to {ERROR_RANGE:g} and above",
@@ -63,6 +67,11 @@ class Panel:
         self._add_presets()
         self._add_screen(buffers, resolution)
         self._add_inputs(controls)
+
+    def say(self, lines: Sequence[str]) -> None:
+        """Shows text above the controls, which keep their places however much it is."""
+        text = "<br>".join(html.escape(line) for line in lines)
+        self._status.content = f'<div style="{STATUS}">{text}</div>'
 
     @property
     def v(self) -> tuple[float, ...]:

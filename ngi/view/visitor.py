@@ -72,11 +72,11 @@ class Visitor:
         with self._sending:
             self._send(shown)
         self._moments.append(perf_counter())
-        self._panel.status.content = self._status(shown, sending=perf_counter() - begin)
+        self._panel.say(self._status(shown, sending=perf_counter() - begin))
 
     def failed(self, error: Exception) -> None:
         """Tells why there is no picture, or no file."""
-        self._panel.status.content = f"This failed: {error or type(error).__name__}"
+        self._panel.say([f"This failed: {str(error) or type(error).__name__}"])
 
     def _send(self, shown: Shown) -> None:
         self._last, self._aspect = shown, self._window()
@@ -103,7 +103,7 @@ class Visitor:
         if self._walk is not None:
             self._walk.follow()
 
-    def _status(self, shown: Shown, *, sending: float) -> str:
+    def _status(self, shown: Shown, *, sending: float) -> list[str]:
         view = shown.view
         parts = {**view.seconds, "sending": sending}
         lines = [
@@ -115,7 +115,7 @@ class Visitor:
         if shown.wish.screen.traces_paths:
             lines.append(f"{view.samples} samples per pixel")
             lines.append(self._metrics(shown))
-        return "  \n".join(lines)
+        return lines
 
     def _pictures_per_second(self) -> float | None:
         """Over the last seconds; None where nothing has moved."""

@@ -1,6 +1,7 @@
 import pytest
 
 from ngi.config.configuration import LONGEST, run_group, run_name
+from tests.config.command_line import composed
 
 
 @pytest.mark.parametrize(
@@ -21,6 +22,16 @@ def test_long_names_are_cut_but_stay_apart() -> None:
     a, b = run_name("x" * 300 + "=1"), run_name("x" * 300 + "=2")
     assert a != b
     assert len(a) < LONGEST + 12
+
+
+def test_a_run_says_all_its_overrides_however_long_its_folders_name() -> None:
+    """By all but the method runs of one way are found (`analysis.pairs`)."""
+    words = [f"model.option_{number}=1" for number in range(10, 30)]
+    config = composed(*(f"+{word}" for word in words), "method=uniform")
+    assert sorted(config.label.overrides.split(",")) == ["method=uniform", *words]
+    folder = config.run.folder.split("/")[-2]
+    assert folder == run_name(config.label.overrides)
+    assert len(folder) < LONGEST + 12 < len(config.label.overrides)
 
 
 def test_runs_are_grouped_by_experiment_or_budget_and_by_clock() -> None:

@@ -6,6 +6,7 @@ import torch
 from scipy.stats import qmc
 
 from ngi.evaluate import EvaluationProtocol, evaluation_frames
+from ngi.render import AnalyticRenderer
 
 
 def test_identity_changes_with_every_field(protocol: EvaluationProtocol) -> None:
@@ -47,6 +48,15 @@ def test_frames_are_the_hard_ones_and_an_even_set(renderer, protocol) -> None:
     points = torch.stack([f.scene_vector for f in uniform]).double().numpy()
     random = np.random.default_rng(0).random(points.shape)
     assert qmc.discrepancy(points) < 0.2 * qmc.discrepancy(random)
+
+
+def test_of_more_variables_than_there_are_sobol_sequences_frames_are_independent(protocol) -> None:
+    many = AnalyticRenderer(dimensions=21_202, patch_size=8)
+    frames = evaluation_frames(many, dataclasses.replace(protocol, low_discrepancy_frames=4))
+    points = torch.stack([frame.scene_vector for frame in frames if frame.set == "uniform"])
+    assert points.shape == (4, 21_202)
+    assert points.mean(dim=1).sub(0.5).abs().max() < 0.02
+    assert points[0].ne(points[1]).all()
 
 
 def test_frames_depend_on_the_protocols_seed_only(renderer, protocol) -> None:

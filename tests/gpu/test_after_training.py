@@ -74,7 +74,7 @@ def test_the_viewer_shows_what_the_network_says(finished: Path) -> None:
     studio = Studio(renderer=run.renderer, predict=run.predict)
     pictures: list[Shown] = []
     v = tuple(run.renderer.hard_frames()[0].tolist())
-    studio.open("a", Wish(Place(v, 24), Screen(exposure=0.0)), pictures.append)
+    studio.open("a", Wish(Place(v, 24), Screen(exposure=0.0)), pictures.append, fail)
     while studio.work(wait=0):
         pass
     time.sleep(SETTLED)
@@ -82,6 +82,10 @@ def test_the_viewer_shows_what_the_network_says(finished: Path) -> None:
         pass
     assert pictures
     assert pictures[-1].pixels.shape == (24, 24, 3)
+
+
+def fail(error: Exception) -> None:
+    raise error
 
 
 @pytest.mark.usefixtures("gpu")

@@ -19,8 +19,10 @@ class MovingCamera(AnalyticRenderer):
 
     camera_part = slice(SCENE_VARIABLES, SCENE_VARIABLES + 2)
 
-    def __init__(self, *, patch_size: int, noise: float = 0.0) -> None:
-        super().__init__(dimensions=SCENE_VARIABLES + 2, patch_size=patch_size, noise=noise)
+    def __init__(self, *, patch_size: int, noise: float = 0.0, halves: bool = False) -> None:
+        super().__init__(
+            dimensions=SCENE_VARIABLES + 2, patch_size=patch_size, noise=noise, halves=halves
+        )
         self._weights[:, self.camera_part] = 0
 
     def shade(self, scene_vectors: Tensor, points: Tensor) -> tuple[Tensor, Tensor]:
@@ -38,4 +40,4 @@ class MovingCamera(AnalyticRenderer):
 
 def moving_camera(**options: Any) -> MovingCamera:
     """For `renderer._target_`, whatever else the configuration of a renderer says."""
-    return MovingCamera(patch_size=options["patch_size"])
+    return MovingCamera(patch_size=options["patch_size"], halves=options["halves"])

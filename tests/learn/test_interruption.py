@@ -4,6 +4,7 @@ import os
 import pickle
 import random
 import signal
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -15,8 +16,9 @@ import pandas as pd
 import pytest
 import torch
 
-from ngi.learn import IlluminationModule, Interrupted, Interruption
+from ngi.learn import IlluminationModule, Interrupted, Interruption, TrainingStream
 from ngi.render import AnalyticRenderer
+from ngi.reuse import PatchStore
 from tests.learn.command_line import start
 from tests.learn.comparison import assert_same_run
 from tests.learn.forked import configuration, run
@@ -125,6 +127,30 @@ def test_sigterm_in_the_middle_of_anything(
         assert steps.iloc[-1] == step
         if method == "predict":
             assert len(pd.read_csv(tmp_path / "run" / "metrics.csv")) == 1, "it was broken off"
+    status, output = run(config, tmp_path / "output")
+    assert status == 0, output
+    assert_same_run(tmp_path / "run", unbroken / "run")
+
+
+@pytest.mark.parametrize(
+    ("owner", "method", "number"),
+    [
+        (PatchStore, "get", 20),  # of a batch that is stored already
+        (IlluminationModule, "training_step", 20),
+        (TrainingStream, "feedback", 20),  # after the optimiser's step
+    ],
+)
+def test_an_exit_within_a_step_goes_on_from_the_checkpoint_before(
+    tmp_path: Path, unbroken: Path, owner: type, method: str, number: int
+) -> None:
+    """As Submitit exits in its handler of SIGUSR2, wherever that comes."""
+    config = configuration(tmp_path, OFTEN, references=unbroken / "references")
+    first = partial(at_call, owner, method, number, partial(sys.exit, 3))
+    status, output = run(config, tmp_path / "output", first=first)
+    assert status == 3, output
+    assert "interrupted, and saved" not in output
+    saved = torch.load(tmp_path / "run" / "last.ckpt", weights_only=True)["global_step"]
+    assert saved % 7 == 0
     status, output = run(config, tmp_path / "output")
     assert status == 0, output
     assert_same_run(tmp_path / "run", unbroken / "run")

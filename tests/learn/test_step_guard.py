@@ -24,7 +24,7 @@ from ngi.learn import (
 )
 from ngi.learn.lightning_api import Callback, Trainer
 from ngi.learn.module import OptimizerFactory
-from ngi.learn.step_guard import LARGEST_NORM, REFUSED_IN_A_ROW, largest_moment
+from ngi.learn.step_guard import LARGEST_NORM, REFUSED_IN_A_ROW, Attempt, largest_moment
 from ngi.learn.stream import TrainingStream
 from ngi.models import L1Dssim, MuonAdam, PixelGenerator
 from ngi.models.pixel_mlp import PixelMLP
@@ -218,6 +218,27 @@ def test_refusals_in_a_row_stop_the_run_with_what_does_the_last_one_again(tmp_pa
     )
     assert torch.equal(losses, report["losses"])
     assert report["optimizer"]["state"] == {}  # no step was taken
+
+
+def test_refusals_before_an_interruption_count(tmp_path: Path) -> None:
+    stream = make(tmp_path, target=LossTimesStep())
+    network = torch.nn.Linear(1, 1)
+    attempt = Attempt(
+        number=1,
+        batch=next(iter(stream)),
+        losses=torch.full((4,), math.nan),
+        loss=math.nan,
+        gradient_norm=1.0,
+        largest_moment=0.0,
+        network=network,
+        optimizer=torch.optim.SGD(network.parameters(), lr=1.0),
+    )
+    before, resumed = (StepGuard(stream=stream, folder=tmp_path) for _ in range(2))
+    for _ in range(REFUSED_IN_A_ROW - 1):
+        before.admit(attempt)
+    resumed.load_state_dict(before.state_dict())
+    with pytest.raises(FloatingPointError, match=f"the {REFUSED_IN_A_ROW}th in a row"):
+        resumed.admit(attempt)
 
 
 @pytest.mark.parametrize(

@@ -280,6 +280,13 @@ def test_bad_construction(box_folder, tmp_path) -> None:
     )
     with pytest.raises(ValueError, match="film is 33 x 32; make width and height equal"):
         MitsubaRenderer(scene=read_scene(tmp_path), backend="scalar")
+    height = '<integer name="height" value="32"/>'
+    assert height in xml
+    (tmp_path / "scene.xml").write_text(
+        xml.replace(height, f'{height}<integer name="crop_height" value="16"/>')
+    )
+    with pytest.raises(ValueError, match="the film shows a part of its picture"):
+        MitsubaRenderer(scene=read_scene(tmp_path), backend="scalar")
     (tmp_path / "scene.xml").write_text(xml.replace('type="roughplastic"', 'type="pplastic"'))
     with pytest.raises(ValueError, match="BSDF 'clay' is of kind"):
         MitsubaRenderer(scene=read_scene(tmp_path), backend="scalar")

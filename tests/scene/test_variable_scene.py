@@ -89,6 +89,31 @@ def test_only_what_changed_is_written(scene, monkeypatch) -> None:
     assert sorted(written) == ["ball.to_world", "metal.brdf_0.alpha.value"]
 
 
+def test_what_was_broken_off_is_written_again(scene, monkeypatch) -> None:
+    """Mitsuba was not told of it: the same v would be taken for what is there."""
+    scene.apply(AUTHORED)
+    before = render(scene.scene)
+    changes = scene.changes
+
+    def full() -> None:
+        raise RuntimeError("out of memory")
+
+    moved = AUTHORED.copy()
+    moved[3:6] = [1, 0.5, 0.25]
+    with monkeypatch.context() as broken:
+        broken.setattr(scene._parameters, "update", full)
+        with pytest.raises(RuntimeError, match="out of memory"):
+            scene.apply(moved)
+    assert scene.changes > changes
+    scene.apply(moved)
+    there = render(scene.scene)
+    scene.apply(AUTHORED)
+    np.testing.assert_array_equal(render(scene.scene), before)
+    scene.apply(moved)
+    np.testing.assert_array_equal(render(scene.scene), there)
+    assert not np.array_equal(there, before)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [

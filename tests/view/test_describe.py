@@ -7,6 +7,7 @@ import yaml
 
 from ngi.machine.backend import activate, dr, llvm_problem
 from ngi.scene import read_scene
+from ngi.scene import starter as first_file
 from ngi.scene.clearance import camera_problems, meeting_views
 from ngi.scene.variable_scene import VariableScene
 from ngi.view.describe import main
@@ -170,6 +171,13 @@ def test_a_plain_file_becomes_a_variable_scene(room, given, capsys) -> None:
     before = (folder / "scene.yaml").read_text()
     assert main([str(folder / "scene.xml"), "backend=scalar"]) == 0
     assert (folder / "scene.yaml").read_text() == before, "an existing scene.yaml was overwritten"
+
+
+def test_numbers_of_large_scenes_are_numbers_to_yaml() -> None:
+    values = [1e4, -12345.0, 1e-5, 0.0, 1e20, 0.123456]
+    written = yaml.safe_load(first_file._list(values))
+    assert [float(f"{x:.4g}") for x in values] == written
+    assert all(isinstance(x, int | float) for x in written)
 
 
 @pytest.mark.parametrize("name", ["2024", "a: b", "yes", "#3", "it's, {odd}"])

@@ -113,6 +113,18 @@ def test_the_command_makes_what_is_seen(browser: Browser) -> None:
     }  # fmt: skip
 
 
+def test_what_it_says_takes_the_same_room_and_is_no_markup(browser: Browser) -> None:
+    """A click that falls while a button moves is lost."""
+    made = visitor(browser)
+    said = []
+    for error in (RuntimeError("<b>1</b>"), RuntimeError()):
+        made.failed(error)
+        said.append(made._panel._status.content)
+    assert "&lt;b&gt;1&lt;/b&gt;" in said[0]
+    assert "This failed: RuntimeError" in said[1]
+    assert all("height: 7em" in each for each in said)
+
+
 def test_where_reset_view_leads_is_where_a_page_begins() -> None:
     page = Page(studio(), subject(), resolution=64, host="127.0.0.1", port=0)
     with closing(page):

@@ -61,7 +61,7 @@ class ObservationSets(Samples):
                 images.unflatten(0, (-1, views.shape[1]))
                 for images in (rendered.buffers, rendered.log_radiance)
             )
-            return replace(rendered, buffers=buffers, log_radiance=log_radiance)
+            return replace(rendered, buffers=buffers, log_radiance=log_radiance, first_half=None)
 
         return Deferred(sets, job)
 

@@ -35,6 +35,11 @@ RUN = (
 )
 
 
+def test_patches_in_two_halves_train_as_whole_ones(tmp_path: Path) -> None:
+    status, output = run(tmp_path, *RUN, "budget.steps=2", "renderer.halves=true")
+    assert status == 0, output
+
+
 def rendered(samples: ObservationSets, *, seed: int) -> Patches:
     """Sets of one scene configuration, from cameras drawn at random."""
     states = torch.rand(SETS, samples.dimensions + 2, generator=torch.Generator().manual_seed(seed))
