@@ -166,8 +166,6 @@ class TrainingStream:
         """Everything the next batch depends on; patches go to the archive, not in here."""
         if self._finish is not None:
             raise RuntimeError("the last step is not finished; call settle() before it is saved")
-        if self._pending is not None:
-            raise RuntimeError("a batch waits for its feedback: save before it or after that")
         return {
             "counters": dict(vars(self.counters)),
             "new_losses": self.new_losses.state_dict(),

@@ -21,7 +21,11 @@ class MovingCamera(AnalyticRenderer):
 
     def __init__(self, *, patch_size: int, noise: float = 0.0, halves: bool = False) -> None:
         super().__init__(
-            dimensions=SCENE_VARIABLES + 2, patch_size=patch_size, noise=noise, halves=halves
+            dimensions=SCENE_VARIABLES + 2,
+            patch_size=patch_size,
+            noise=noise,
+            halves=halves,
+            samples_per_pixel=1 + halves,
         )
         self._weights[:, self.camera_part] = 0
 
@@ -40,4 +44,4 @@ class MovingCamera(AnalyticRenderer):
 
 def moving_camera(**options: Any) -> MovingCamera:
     """For `renderer._target_`, whatever else the configuration of a renderer says."""
-    return MovingCamera(patch_size=options["patch_size"], halves=options["halves"])
+    return MovingCamera(patch_size=options["patch_size"], halves=options.get("halves", False))

@@ -36,7 +36,7 @@ RUN = (
 
 
 def test_patches_in_two_halves_train_as_whole_ones(tmp_path: Path) -> None:
-    status, output = run(tmp_path, *RUN, "budget.steps=2", "renderer.halves=true")
+    status, output = run(tmp_path, *RUN, "budget.steps=2", "+renderer.halves=true")
     assert status == 0, output
 
 
