@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -137,8 +138,7 @@ class Evaluation:
                 row[f"{set_name}_{metric}"] = None if values is None else mean(values)
                 row[f"{set_name}_{metric}_worst5"] = None if values is None else worst_mean(values)
             row[f"{set_name}_relmse"] = mean(frame.relmse for frame in self._of(set_name))
-            log_errors = torch.cat([frame.log_errors for frame in self._of(set_name)])
-            row[f"{set_name}_tail"] = worst(log_errors).mean().item()
+            row[f"{set_name}_tail"] = self._tails[set_name]
             row[f"{set_name}_non_finite"] = sum(frame.non_finite for frame in metrics)
         return row
 
@@ -176,6 +176,12 @@ class Evaluation:
             },
             "lpips_note": self.lpips_note,
         }
+
+    @cached_property
+    def _tails(self) -> dict[str, float]:
+        """By set, for `row` and `result`: it sorts every pixel."""
+        errors = {name: torch.cat([f.log_errors for f in self._of(name)]) for name in SETS}
+        return {name: worst(of_set).mean().item() for name, of_set in errors.items()}
 
     def _of(self, set_name: str) -> list[EvaluatedFrame]:
         return [frame for frame in self.frames if frame.frame.set == set_name]

@@ -63,17 +63,21 @@ def check_address(host: str, port: int) -> None:
             probe = socket.socket(family, kind, protocol)
         except OSError:  # of a kind that this machine lacks, as IPv6: asyncio leaves it out, too
             continue
-        with probe:
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            if family == socket.AF_INET6:
-                probe.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 1)
-            try:
-                probe.bind(address)
-            except OSError as error:
-                if error.errno != errno.EADDRINUSE or port == LAST_PORT:
-                    raise ValueError(
-                        f"host: {host}, port: {port}: cannot be opened: {error.strerror}"
-                    ) from error
+        try:
+            _bind(probe, address)
+        except OSError as error:
+            if error.errno != errno.EADDRINUSE or port == LAST_PORT:
+                said = f"host: {host}, port: {port}: cannot be opened: {error.strerror}"
+                raise ValueError(said) from error
+
+
+def _bind(probe: socket.socket, address: Any) -> None:
+    """As asyncio does, and closes it."""
+    with probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        if probe.family == socket.AF_INET6:
+            probe.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 1)
+        probe.bind(address)
 
 
 def is_own_page(origin: str | None, name: str | None, *, host: str) -> bool:

@@ -22,6 +22,7 @@ from tests.gpu.test_runs import OURS, assert_close, trained
 from tests.learn.command_line import SMALL
 from tests.learn.comparison import assert_same, final_state
 from tests.learn.lightning_warnings import IGNORED, RESUMED
+from tests.view.test_studio import fail
 
 pytestmark = [*IGNORED, RESUMED]
 
@@ -82,10 +83,6 @@ def test_the_viewer_shows_what_the_network_says(finished: Path) -> None:
         pass
     assert pictures
     assert pictures[-1].pixels.shape == (24, 24, 3)
-
-
-def fail(error: Exception) -> None:
-    raise error
 
 
 @pytest.mark.usefixtures("gpu")

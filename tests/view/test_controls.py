@@ -7,7 +7,7 @@ from ngi.scene import SceneDescription, read_scene, scenes
 from ngi.scene.kinds import LookAt
 from ngi.scene.variable import DiscreteVariable, RangedVariable
 from ngi.view.inputs import controls, unnamed_controls
-from ngi.view.subject import camera_of
+from ngi.view.subject import Camera, camera_of
 
 
 def shipped(name: str) -> SceneDescription:
@@ -57,11 +57,17 @@ WITH_CAMERA = [
 ]
 
 
-@pytest.mark.parametrize("name", WITH_CAMERA)
-def test_a_view_that_v_can_have_is_kept(name: str) -> None:
+def walked(name: str) -> tuple[SceneDescription, Camera]:
+    """A scene whose camera walks, and that camera."""
     scene = shipped(name)
     camera = camera_of(scene)
     assert camera is not None
+    return scene, camera
+
+
+@pytest.mark.parametrize("name", WITH_CAMERA)
+def test_a_view_that_v_can_have_is_kept(name: str) -> None:
+    scene, camera = walked(name)
     generator = np.random.default_rng(1)
     for _ in range(20):
         v = generator.random(scene.dimensions)
@@ -77,8 +83,7 @@ def test_a_view_that_v_can_have_is_kept(name: str) -> None:
 
 
 def test_a_view_beyond_the_box_ends_at_its_wall() -> None:
-    camera = camera_of(shipped("living-room"))
-    assert camera is not None
+    _, camera = walked("living-room")
     high = np.array(camera.variable.maximum)
     moved = camera.components(high[:3] + 10, high[3:])
     assert moved[:3].tolist() == [1, 1, 1]
@@ -87,9 +92,7 @@ def test_a_view_beyond_the_box_ends_at_its_wall() -> None:
 
 @pytest.mark.parametrize("name", WITH_CAMERA)
 def test_a_mouse_that_turns_little_by_little_turns_the_view_so(name: str) -> None:
-    scene = shipped(name)
-    camera = camera_of(scene)
-    assert camera is not None
+    scene, camera = walked(name)
     generator = np.random.default_rng(2)
     for _ in range(8):
         v = generator.random(scene.dimensions)
