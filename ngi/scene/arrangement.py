@@ -10,6 +10,9 @@ instance, so that its vertices are never rewritten.
 from collections.abc import Sequence
 from xml.etree import ElementTree
 
+import numpy as np
+
+from ngi.scene.assets import authored_to_world
 from ngi.scene.kinds import KeyFrames, Rotation, Scale, Shape, Translation, Visibility
 from ngi.scene.scene_files import SceneFile
 from ngi.scene.variable import Variable
@@ -54,9 +57,7 @@ def arranged(
             group = ElementTree.SubElement(root, "shape", type="shapegroup", id=f"ngi_{name}")
             group.append(shape)
             instance = _add_instance(root, str(name), of=group)
-            for transform in shape.findall("transform"):  # the instance's, so that it has an origin
-                shape.remove(transform)
-                instance.append(transform)
+            _hand_over_place(document, str(name), shape=shape, instance=instance)
     if static and sum(_mesh_size(document, shape) for shape in static) >= worthwhile:
         group = ElementTree.SubElement(root, "shape", type="shapegroup", id="ngi_static_group")
         for shape in static:
@@ -64,6 +65,29 @@ def arranged(
             group.append(shape)
         _add_instance(root, STATIC, of=group)
     return copied
+
+
+def _hand_over_place(
+    document: SceneFile, name: str, *, shape: ElementTree.Element, instance: ElementTree.Element
+) -> None:
+    """Makes a shape's to_world the instance's, so that this has its origin.
+
+    Of one that mirrors only the origin: Mitsuba turns a mirrored mesh inside out, but no mirrored
+    instance of it.
+    """
+    transforms = shape.findall("transform")
+    matrix = authored_to_world(document, name) if transforms else np.eye(4)
+    if np.linalg.det(matrix[:3, :3]) < 0:
+        (own,) = transforms
+        handed = ElementTree.Element("transform", dict(own.attrib))
+        for transform, sign in ((own, -1), (handed, 1)):
+            place = dict(zip("xyz", map(repr, (sign * matrix[:3, 3]).tolist()), strict=True))
+            ElementTree.SubElement(transform, "translate", place)
+        instance.append(handed)
+        return
+    for transform in transforms:
+        shape.remove(transform)
+        instance.append(transform)
 
 
 def moving(variables: Sequence[Variable]) -> set[str]:

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from functools import partial
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ngi.machine.backend import dr, mi
+from ngi.scene.arrangement import STATIC
 from ngi.scene.description import SceneDescription
 from ngi.scene.jit_variables import aligned
 from ngi.scene.kinds import CameraPath, LookAt
-from ngi.scene.scene_parameters import has_surface
 from ngi.scene.variable_scene import VariableScene
 
 Points = NDArray[np.float64]
@@ -138,16 +139,29 @@ def out_of_bounds(scene: VariableScene) -> list[str]:
     farthest: dict[str, float] = {}
     for v in _configurations(scene.description, MEASURED):
         scene.apply(v)
-        for shape in filter(has_surface, scene.shapes):
-            box = shape.bbox()
-            out = np.maximum(low - np.array(box.min).ravel(), np.array(box.max).ravel() - high)
-            farthest[shape.id()] = max(farthest.get(shape.id(), 0.0), float(out.max()))
+        hidden = scene.description.hidden(v)
+        for shape, instance in scene.placed():
+            name = shape.id() if instance is None or instance.id() == STATIC else instance.id()
+            if name not in hidden:
+                corners = _corners(shape, instance)
+                out = float(np.maximum(low - corners, corners - high).max())
+                farthest[name] = max(farthest.get(name, 0.0), out)
     size = float(np.linalg.norm(high - low))
     return [
         f"'{name}' reaches {far:.3g} out of bounds; where the camera can see that, widen bounds"
         for name, far in sorted(farthest.items(), key=lambda item: -item[1])
         if far > TOLERANCE * size
     ]
+
+
+def _corners(shape: mi.Shape, instance: mi.Shape | None) -> Points:
+    """[8, 3]: of the box of a shape, where the instance that shows it has put it."""
+    box = shape.bbox()
+    corners = np.array(list(product(*zip(np.ravel(box.min), np.ravel(box.max), strict=True))))
+    if instance is None:
+        return corners
+    matrix = np.array(mi.traverse(instance)["to_world"].matrix, np.float64).reshape(4, 4)
+    return corners @ matrix[:3, :3].T + matrix[:3, 3]
 
 
 def meeting_views(description: SceneDescription) -> list[str]:

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ngi.scene.kinds import CameraPath, FieldOfView, LookAt, Material
+from ngi.scene.kinds import CameraPath, FieldOfView, LookAt, Material, Shape, Visibility
 from ngi.scene.scene_files import SceneFile
 from ngi.scene.transforms import Matrix, look_at
 from ngi.scene.variable import Variable
@@ -71,6 +71,16 @@ class SceneDescription:
             if isinstance(variable, Material):
                 changed[part] = 0
         return changed
+
+    def hidden(self, scene_vector: ArrayLike) -> frozenset[str]:
+        """Ids of the objects that are not there at v [D]."""
+        hidden: set[str] = set()
+        for variable, value in zip(self.variables, self.values(scene_vector), strict=True):
+            if isinstance(variable, Visibility) and not value[0]:
+                hidden.update(variable.objects)
+            elif isinstance(variable, Shape):
+                hidden.update(set(variable.choices) - {variable.choices[int(value[0])]})
+        return frozenset(hidden)
 
     @property
     def camera_part(self) -> slice:

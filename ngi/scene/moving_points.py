@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from ngi.machine.backend import mi
 from ngi.patches import MovingPoints
-from ngi.scene.kinds import Translation
+from ngi.scene.description import SceneDescription
+from ngi.scene.kinds import Shape, Translation
 from ngi.scene.scene_parameters import emits
 from ngi.scene.variable import Variable
 from ngi.scene.variable_scene import VariableScene
@@ -41,9 +42,8 @@ def moving_points(scene: VariableScene) -> MovingPoints:
     """
     description = scene.description
     v = description.with_first_materials(np.full(description.dimensions, 0.5))
-    scene.apply(v)
     moved = [
-        _moved(scene, variable, part)
+        _moved(scene, variable, part, v)
         for variable, part in description.parts()
         if isinstance(variable, Translation) and part.stop > part.start and _seen(scene, variable)
     ]
@@ -63,12 +63,34 @@ def _seen(scene: VariableScene, variable: Variable) -> bool:
     return all(isinstance(owner, mi.Shape | mi.Emitter) for owner in scene.owners(variable))
 
 
-def _moved(scene: VariableScene, variable: Variable, part: slice) -> _Moved:
+def _moved(scene: VariableScene, variable: Variable, part: slice, v: NDArray[np.float64]) -> _Moved:
     owners = scene.owners(variable)
-    boxes = [owner.bbox() for owner in owners]
-    low = np.min([np.ravel(box.min) for box in boxes], axis=0)
-    high = np.max([np.ravel(box.max) for box in boxes], axis=0)
+    boxes = []
+    for name, owner in zip(variable.objects, owners, strict=True):
+        scene.apply(_showing(scene.description, name, v))
+        boxes.append(_box(owner))
+    low, high = np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1]
     count = part.stop - part.start
     start = variable.value(np.zeros(count))
     columns = np.stack([variable.value(unit) - start for unit in np.eye(count)], axis=1)
     return _Moved((low + high) / 2, columns, part, any(map(emits, owners)))
+
+
+def _showing(
+    description: SceneDescription, name: str, v: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """The same v [D], but with this object where it takes turns with others."""
+    shown = v.copy()
+    for variable, part in description.parts():
+        if isinstance(variable, Shape) and name in variable.choices:
+            shown[part] = (variable.choices.index(name) + 0.5) / len(variable.choices)
+    return shown
+
+
+def _box(owner: mi.Object) -> NDArray[np.float64]:
+    """[2, 3]: the corners of its box; of what has none, such as a projector, the place twice."""
+    box = owner.bbox()
+    if box.valid():
+        return np.array([np.ravel(box.min), np.ravel(box.max)], np.float64)
+    to_world = np.array(mi.traverse(owner)["to_world"].matrix, np.float64).reshape(4, 4)
+    return np.stack([to_world[:3, 3]] * 2)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,8 @@ class Parameters:
         self._changes = Changes(scene, self._parameters)
         self._file = document.path
         self._found: set[str] = set()
+        self._taken: dict[str, str] = {}
+        self._taker = ""
         self._objects = {
             node.id(): node
             for node in self._parameters.hierarchy
@@ -46,7 +49,32 @@ class Parameters:
             raise FileNotFoundError(f"{path}: no such file, but scene.yaml names it")
         return path
 
+    @contextmanager
+    def taken_by(self, variable: str) -> Iterator[None]:
+        """Whose the parameters are that are taken meanwhile; variable: its name, for errors."""
+        self._taker = variable
+        try:
+            yield
+        finally:
+            self._taker = ""
+
+    def take(self, what: str) -> None:
+        """ValueError where another variable sets it already, by whatever name.
+
+        Of two the last to change would win, so that the same v were not always the same scene.
+        """
+        if (other := self._taken.setdefault(what, self._taker)) != self._taker:
+            raise ValueError(f"it sets {what}, as {other} does; leave one of the two out")
+
     def parameter(
+        self, object_id: str, suffixes: tuple[str, ...], *, hint: str, of: Sequence[str] = ()
+    ) -> str:
+        """As `find`, for one variable alone: ValueError as `take`."""
+        key = self.find(object_id, suffixes, hint=hint, of=of)
+        self.take(key)
+        return key
+
+    def find(
         self, object_id: str, suffixes: tuple[str, ...], *, hint: str, of: Sequence[str] = ()
     ) -> str:
         """The parameter of an object that ends with the first suffix found.

@@ -139,7 +139,7 @@ class Vertices(Body):
         hint = "it has no vertices"
         self._parameters, self._id = parameters, object_id
         self._keys = [
-            parameters.parameter(object_id, (name,), hint=hint)
+            parameters.find(object_id, (name,), hint=hint)
             for name in ("vertex_positions", "vertex_normals")
         ]
         self.key = self._keys[0]
@@ -166,12 +166,12 @@ class Emission:
     """Colour times factor of an emitter; either may vary."""
 
     def __init__(self, parameters: Parameters, key: str) -> None:
-        self._parameters, self._key = parameters, key
+        self._parameters, self.key = parameters, key
         self.colour, self._factor = parameters.read(key), 1.0
 
     def set_factor(self, factor: Values) -> None:
         self._factor = float(factor[0])
-        self._parameters.write(self._key, self._factor * self.colour)
+        self._parameters.write(self.key, self._factor * self.colour)
 
     def set_colour(self, colour: Values) -> None:
         self.colour = colour

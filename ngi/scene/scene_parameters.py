@@ -26,6 +26,10 @@ def has_surface(shape: mi.Shape) -> bool:
     return not shape.class_name().startswith(("Instance", "ShapeGroup"))
 
 
+def _infinite(owner: mi.Object) -> bool:
+    return isinstance(owner, mi.Emitter) and mi.has_flag(owner.flags(), mi.EmitterFlags.Infinite)
+
+
 def emits(owner: mi.Object) -> bool:
     """Whether it is an emitter, or a shape that carries one."""
     return isinstance(owner, mi.Emitter) or (isinstance(owner, mi.Shape) and owner.is_emitter())
@@ -44,12 +48,20 @@ class SceneParameters(Parameters):
         self._placements: dict[str, Placement] = {}
         self._emissions: dict[str, Emission] = {}
 
-    def placement(self, object_id: str, *, only: Sequence[str] = ()) -> Placement:
+    def placement(
+        self, object_id: str, *, only: Sequence[str] = (), finite: bool = False
+    ) -> Placement:
         """Where an object stands, the same for all variables that act on it.
 
-        only: Mitsuba's classes of what can stand so; all where empty.
+        only: Mitsuba's classes of what can stand so; all where empty. finite: not what is
+        infinitely far away.
         """
         owner = self.object(object_id)
+        if finite and _infinite(owner):
+            raise ValueError(
+                f"{self._file}: '{object_id}' is infinitely far away, as every "
+                f"{owner.class_name()}; vary its rotation or, of a sun, its direction"
+            )
         if only and owner.class_name() not in only:
             raise ValueError(
                 f"{self._file}: '{object_id}' is a {owner.class_name()}; name one of {list(only)}"
@@ -64,7 +76,7 @@ class SceneParameters(Parameters):
         # Not every mi.Mesh is one of vertices: a rectangle has a to_world.
         if isinstance(owner, mi.Mesh) and owner.class_name() != "Rectangle":
             return Vertices(self, object_id)
-        key = self.parameter(
+        key = self.find(
             object_id,
             ("to_world", "position"),
             hint="it has no place that could vary; a lamp's is its shape's",
@@ -73,11 +85,14 @@ class SceneParameters(Parameters):
 
     def intensity(self, object_id: str) -> Write:
         """A function that sets the factor [1] on an emitter's colour."""
-        return self._emission(object_id).set_factor
+        emission = self._emission(object_id)
+        self.take(f"the intensity of {emission.key}")
+        return emission.set_factor
 
     def radiance(self, object_id: str) -> Write:
         """A function that sets an emitter's colour [3]."""
         emission = self._emission(object_id)
+        self.take(f"the colour of {emission.key}")
         if emission.colour.size != 3:
             raise ValueError(
                 f"{self._file}: radiance of '{object_id}': it holds {emission.colour.size} "
@@ -86,7 +101,7 @@ class SceneParameters(Parameters):
         return emission.set_colour
 
     def _emission(self, object_id: str) -> Emission:
-        key = self.parameter(
+        key = self.find(
             object_id,
             ("radiance.value", "intensity.value", "irradiance.value", "scale"),
             hint="name an emitter, or the shape that carries it, with a constant radiance",
@@ -98,6 +113,8 @@ class SceneParameters(Parameters):
     def materials(self, object_id: str, bsdfs: Sequence[str]) -> Write:
         """A function that gives a shape, or all of an instance's, the BSDF of an index [1]."""
         shapes = self.dressed(object_id)
+        for shape in shapes:
+            self.take(f"the material of '{shape.id()}'")
         choices = [self.object(name) for name in bsdfs]
         for name, choice in zip(bsdfs, choices, strict=True):
             if not isinstance(choice, mi.BSDF):

@@ -47,13 +47,24 @@ class VariableScene:
 
     def _bind(self, variable: Variable) -> Write:
         """ValueError, naming the file and the variable, also for what Mitsuba does not take."""
+        place = f"{'+'.join(variable.objects)}.{variable.kind}"
         try:
-            return variable.bind(self._parameters)
+            self._check_camera(variable)
+            with self._parameters.taken_by(place):
+                return variable.bind(self._parameters)
         except (ValueError, RuntimeError) as error:
             path = str(self.description.document.path)
-            place = f"{'+'.join(variable.objects)}.{variable.kind}"
             prefix = "" if path in str(error) else f"{path}: {place}: "
             raise ValueError(f"{prefix}{error}") from error
+
+    def _check_camera(self, variable: Variable) -> None:
+        rendered = self.scene.sensors()[0]
+        for owner in () if isinstance(variable, DiscreteVariable) else self.owners(variable):
+            if isinstance(owner, mi.Sensor) and owner != rendered:
+                raise ValueError(
+                    f"'{owner.id()}' is not rendered, for the first sensor of the file is "
+                    f"'{rendered.id()}'; name that one, or put the other first"
+                )
 
     @cached_property
     def moving(self) -> frozenset[str]:

@@ -14,6 +14,7 @@ from ngi.scene.loading import load
 from ngi.scene.scene_files import SceneFile
 from ngi.scene.variable_scene import VariableScene
 from tests.render.box import BOX
+from tests.scene.stage import moved
 
 XML = """<scene version="3.0.0">
 <emitter type="area" id="light"/>
@@ -65,6 +66,7 @@ def test_what_stays_is_one_instance_but_for_emitters(variable) -> None:
 
 
 def test_a_mesh_that_moves_becomes_an_instance_with_its_place() -> None:
+    activate("scalar")
     result = arranged(document(), [move("table")], worthwhile=0)
     instance = result.root.find("shape[@id='table']")
     assert instance.get("type") == "instance"
@@ -89,9 +91,9 @@ def test_the_picture_is_the_same() -> None:
     activate("scalar")
     description = read_scene(BOX)
     plain = load(description.document)
-    moved = load(arranged(description.document, description.variables, worthwhile=0))
-    assert len(moved.shapes()) < len(plain.shapes())
-    images = [np.array(mi.render(scene, spp=4, seed=1)) for scene in (plain, moved)]
+    behind = load(arranged(description.document, description.variables, worthwhile=0))
+    assert len(behind.shapes()) < len(plain.shapes())
+    images = [np.array(mi.render(scene, spp=4, seed=1)) for scene in (plain, behind)]
     # A path may take another turn where rounding differs.
     assert np.isclose(*images, rtol=1e-3, atol=1e-4).mean() > 0.99
 
@@ -116,6 +118,32 @@ def test_a_moved_mesh_turns_about_its_authored_origin(tmp_path) -> None:
     corner = scene.scene.ray_intersect(mi.Ray3f([5 + 1.4, 5, 0], [0, -1, 0]))
     assert corner.is_valid(), "a cube turned by 45 degrees about its middle reaches to sqrt(2)"
     assert not scene.scene.ray_intersect(mi.Ray3f([5.95, 5, 0.95], [0, -1, 0])).is_valid()
+
+
+def test_a_mirrored_mesh_that_moves_shows_the_same_side(make_scene) -> None:
+    """As it does at rest, where Mitsuba turns it inside out."""
+    activate("scalar")
+    entry = {
+        "object": "curtain",
+        "property": "rotation",
+        "axis": [0, 1, 0],
+        "minimum": 0,
+        "maximum": 90,
+    }
+    description = read_scene(
+        make_scene("stage", [entry], dimensions=1, edit=moved("curtain", ("scale", {"x": -1.0})))
+    )
+    plain, arranged_one = load(description.document), VariableScene(description)
+    arranged_one.apply([0.0])
+    for x in (-0.6, -0.2, 0.1, 0.4):
+        ray = mi.Ray3f([x, 1.05, 3], [0, 0, -1])
+        at_rest, moving = (s.ray_intersect(ray) for s in (plain, arranged_one.scene))
+        assert at_rest.is_valid()
+        np.testing.assert_allclose(moving.p, at_rest.p, atol=1e-5)
+        np.testing.assert_allclose(moving.n, at_rest.n, atol=1e-5)
+        np.testing.assert_allclose(moving.sh_frame.n, at_rest.sh_frame.n, atol=1e-5)
+    placement = arranged_one._parameters.placement("curtain")
+    np.testing.assert_allclose(placement.origin, [-0.1, 1, -0.5], atol=1e-6)
 
 
 def test_small_scenes_keep_their_shapes_and_large_ones_do_not(tmp_path) -> None:

@@ -1,5 +1,7 @@
 """What scene.yaml asks of a loaded scene that cannot be done is said when it is loaded."""
 
+import copy
+
 import numpy as np
 import pytest
 from PIL import Image
@@ -7,7 +9,7 @@ from PIL import Image
 from ngi.machine.backend import activate, mi
 from ngi.scene import read_scene
 from ngi.scene.variable_scene import VariableScene
-from tests.scene.stage import curtain, write_ply
+from tests.scene.stage import curtain, find, write_ply
 
 RADIANCE = {"property": "radiance", "minimum": [0, 0, 0], "maximum": [1, 1, 1]}
 ALBEDO = {"property": "albedo", "minimum": [0, 0, 0], "maximum": [1, 1, 1]}
@@ -38,6 +40,12 @@ def second_instance(root) -> None:
     instance = root.makeelement("shape", {"type": "instance", "id": "wedge_2"})
     instance.append(root.makeelement("ref", {"id": "wedge_group"}))
     root.append(instance)
+
+
+def second_camera(root) -> None:
+    other = copy.deepcopy(find(root, "camera"))
+    other.set("id", "other")
+    root.append(other)
 
 
 @pytest.fixture
@@ -95,6 +103,18 @@ def other_mesh(folder) -> None:
         ),
         ({"object": "sky", **AIM}, r"'sky' is a EnvironmentMapEmitter; name one of \['Dir", FIELD),
         ({"object": "lamp", **MOVE}, "'lamp' .* a lamp's is its shape's", {}),
+        ({"object": "sky", **MOVE}, "'sky' .* infinitely far away.*vary its rotation", FIELD),
+        (
+            {"object": "sky", "property": "scale", "minimum": 1, "maximum": 2},
+            "'sky' .* infinitely far away",
+            FIELD,
+        ),
+        (
+            {"object": "other", **LOOK},
+            "'other' is not rendered, for the first sensor of the file is 'camera'",
+            {"edit": second_camera},
+        ),
+        ({"object": "other", **WIDE}, "'other' is not rendered", {"edit": second_camera}),
         (
             {"object": "ball", **LOOK},
             r"'ball' is a Sphere; name one of \['PerspectiveCamera'\]",
@@ -166,6 +186,45 @@ def other_mesh(folder) -> None:
 def test_what_cannot_vary(load, entry, message, arguments) -> None:
     with pytest.raises(ValueError, match=message):
         load(entry, **arguments)
+
+
+BRIGHT = {"property": "intensity", "minimum": 0, "maximum": 2}
+ROUGH = {"property": "roughness", "minimum": 0.1, "maximum": 0.5}
+
+
+def name_what_is_inside(root) -> None:
+    find(root, "metal").find("bsdf").set("id", "inner")
+
+
+@pytest.mark.parametrize(
+    ("entries", "what"),
+    [
+        ([{"object": "lamp", **BRIGHT}, {"object": "light", **BRIGHT}], "the intensity of light"),
+        ([{"object": "lamp", **RADIANCE}, {"object": "light", **RADIANCE}], "the colour of light"),
+        ([{"object": "metal", **ROUGH}, {"object": "inner", **ROUGH}], "metal.*alpha.value"),
+        (
+            [material("wedge", "paint", "blue"), material("wedge_group", "paint", "blue")],
+            "the material of 'wedge_mesh'",
+        ),
+    ],
+)
+def test_two_variables_may_not_set_the_same_thing(make_scene, entries, what) -> None:
+    """By two names, of which the last to change would win."""
+    activate("scalar")
+    count = sum(np.size(entry.get("minimum", 0)) for entry in entries)
+    folder = make_scene("stage", entries, dimensions=count, edit=name_what_is_inside)
+    first, second = (f"{entry['object']}.{entry['property']}" for entry in entries)
+    with pytest.raises(ValueError, match=f"{second}: it sets {what}.*, as {first} does"):
+        VariableScene(read_scene(folder))
+
+
+def test_two_variables_may_set_two_things_of_one_object(make_scene) -> None:
+    activate("scalar")
+    entries = [{"object": "lamp", **BRIGHT}, {"object": "light", **RADIANCE}]
+    scene = VariableScene(read_scene(make_scene("stage", entries, dimensions=4)))
+    scene.apply([0.25, 1, 0.5, 0])
+    radiance = mi.traverse(scene.scene)["light.emitter.radiance.value"]
+    np.testing.assert_allclose(np.ravel(radiance), [0.5, 0.25, 0], atol=1e-6)
 
 
 def test_frames_are_those_of_the_mesh_in_its_place(load) -> None:

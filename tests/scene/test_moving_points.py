@@ -1,6 +1,7 @@
 """Where what moves is, against the boxes of Mitsuba's shapes at other v."""
 
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -14,6 +15,11 @@ from ngi.scene.moving_points import MOST, moving_points
 from ngi.scene.variable_scene import VariableScene
 
 SCENES = root() / "scenes"
+RAISE = {"property": "translation", "minimum": [0, 0, 0], "maximum": [0, 0.9, 0]}
+PROJECTOR = """<emitter type="projector" id="beamer"><float name="fov" value="30"/>
+<texture type="bitmap" name="irradiance"><string name="filename" value="plain.png"/></texture>
+<transform name="to_world"><lookat origin="1, 2, 0.5" target="0, 0, 0" up="0, 1, 0"/></transform>
+</emitter>"""
 
 
 @pytest.fixture(autouse=True)
@@ -60,6 +66,38 @@ def test_points_are_where_what_moves_is(name: str, things: list[tuple[str, ...]]
             torch.testing.assert_close(position, centre(scene, *names), atol=1e-5, rtol=0)
     low, high = np.array(scene.description.bounds)
     np.testing.assert_allclose(points.extent, (high - low) / max(high - low), rtol=1e-6)
+
+
+CHOICE = {"object": "any", "property": "shape", "choices": ["ball", "wedge", "cube"]}
+MOVE = {"property": "translation", "minimum": [0, 0, 0], "maximum": [0.4, 0, 0.2]}
+
+
+def test_what_takes_turns_with_others_is_where_it_is_shown(make_scene) -> None:
+    entries = [CHOICE, {"object": "wedge", **MOVE}, {"object": ["ball", "cube"], **RAISE}]
+    scene = loaded(make_scene("stage", entries, dimensions=4))
+    raised, wedge = positions(moving_points(scene), np.zeros(4))
+    boxes = []
+    for choice, name in ((0.0, "ball"), (0.5, "wedge"), (1.0, "cube")):
+        scene.apply([choice, 0, 0, 0])
+        if name == "wedge":
+            torch.testing.assert_close(wedge, centre(scene, name), atol=1e-5, rtol=0)
+        else:
+            boxes.append(next(shape.bbox() for shape in scene.shapes if shape.id() == name))
+    boxes[0].expand(boxes[1])
+    low, high = np.array(scene.description.bounds)
+    expected = (np.array(boxes[0].center()).ravel() - low) / (high - low)
+    np.testing.assert_allclose(raised, expected, atol=1e-5)
+
+
+def test_a_projector_is_where_it_stands(make_scene) -> None:
+    def edit(root) -> None:
+        root.append(ElementTree.fromstring(PROJECTOR))
+
+    folder = make_scene("stage", [{"object": "beamer", **MOVE}], dimensions=2, edit=edit)
+    points = moving_points(loaded(folder))
+    for v, place in (([0, 0], [1, 2, 0.5]), ([1, 0.5], [1.4, 2, 0.6])):
+        expected = (np.array(place) - [-2, 0, -2]) / [4, 3, 4]
+        np.testing.assert_allclose(positions(points, np.array(v))[0], expected, atol=1e-6)
 
 
 def test_of_many_the_lights_and_what_moves_farthest_are_told() -> None:

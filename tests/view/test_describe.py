@@ -142,6 +142,28 @@ def test_geometry_out_of_bounds_is_noted(room, capsys) -> None:
     assert text.count("note:") == 1
 
 
+def test_what_is_hidden_or_a_part_of_what_moves_is_in_bounds(room, capsys) -> None:
+    hide = "{object: ball, property: visibility}"
+    up = "{object: ball, property: translation, minimum: [0,0.5,0], maximum: [0,0.6,0]}"
+    turn = (
+        "{object: box, property: rotation, axis: [0,1,0], pivot: [0,2,0], minimum: 0, maximum: 90}"
+    )
+    folder = room(FREE, hide, up, turn)
+    text = (folder / "scene.xml").read_text()
+    box = """<shape type="shapegroup" id="box_group"><shape type="cube" id="part">
+        <transform name="to_world"><translate x="90"/><scale value="0.1"/></transform></shape>
+        </shape><shape type="instance" id="box"><transform name="to_world">
+        <translate x="DISTANCE"/><translate y="2"/></transform><ref id="box_group"/></shape>"""
+    notes = {}
+    for distance in ("-9", "-3"):
+        placed = box.replace("DISTANCE", distance)
+        (folder / "scene.xml").write_text(text.replace("</scene>", placed + "</scene>"))
+        assert main([str(folder), "backend=scalar"]) == 0
+        notes[distance] = [line for line in capsys.readouterr().out.splitlines() if "note:" in line]
+    assert notes["-9"] == []
+    assert ["'box' reaches" in line for line in notes["-3"]] == [True]
+
+
 @pytest.mark.parametrize("given", ["scene.xml", "."])
 def test_a_plain_file_becomes_a_variable_scene(room, given, capsys) -> None:
     folder = room(FREE)

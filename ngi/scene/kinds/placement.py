@@ -27,7 +27,7 @@ class Translation(RangedVariable):
     numbers = ("x", "y", "z")
 
     def bind_one(self, scene: LoadedScene, object_id: str) -> Write:
-        step = scene.placement(object_id).step(last=True)
+        step = scene.placement(object_id, finite=True).step(last=True)
         return lambda offset: step(transforms.translation(offset))
 
 
@@ -72,7 +72,7 @@ class Scale(RangedVariable):
     limits = (1e-6, 1e6)
 
     def bind_one(self, scene: LoadedScene, object_id: str) -> Write:
-        placement = scene.placement(object_id)
+        placement = scene.placement(object_id, finite=True)
         pivot = placement.origin if self.pivot is None else np.array(self.pivot)
         step = placement.step()
         return lambda factor: step(transforms.about(pivot, transforms.scale(factor[0])))
