@@ -11,6 +11,7 @@ from tqdm import tqdm
 
 from analysis.claim_tables import claims_table
 from analysis.dimensions_plot import write_dimensions_figures
+from analysis.doubts import comparison_warnings
 from analysis.evidence import Verdict
 from analysis.exploration import exploration_table
 from analysis.exploration_plots import write_exploration_figures
@@ -23,7 +24,7 @@ from analysis.pairs import ways_left_out
 from analysis.pictures import write_comparisons
 from analysis.plots import method_styles, write_error_curves
 from analysis.provenance import provenance_frame
-from analysis.runs import SETS, Run, check_comparable, comparison_warnings, find_runs
+from analysis.runs import SETS, Run, check_comparable, find_runs
 from analysis.summary import REFERENCE_NOISE, Comparison, Summary, compare, summarise, to_frame
 from analysis.tables import (
     Table,

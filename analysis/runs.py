@@ -20,14 +20,10 @@ from analysis.run_checks import (
     read_table,
 )
 
-__all__ = ["DISTINCTIONS", "FURTHER", "METRICS", "SETS", "Run", "check_comparable"]
-__all__ += ["comparison_warnings", "find_runs"]
+__all__ = ["DISTINCTIONS", "FURTHER", "METRICS", "SETS", "Run", "check_comparable", "find_runs"]
 
 SCHEMA_VERSION = 1
 """Of the result files this program understands."""
-
-MOST_TIME_APART = 0.05
-"""Relative difference of run times up to which runs count as given the same time."""
 
 FURTHER = ("relmse", "tail")
 """Measured beside the paper's metrics, of a set's frames together; older runs lack them."""
@@ -164,74 +160,6 @@ def check_comparable(runs: Sequence[Run]) -> None:
                 f"{other.folder} and {run.folder} are the same method ({run.method}) with the "
                 f"same seed ({run.seed}); move one of them out of the folder"
             )
-
-
-def comparison_warnings(runs: Sequence[Run]) -> list[str]:
-    """What makes a comparison doubtful without forbidding it, a line each.
-
-    Trained runs of one scene whose run times are more than 5 % apart, runs of which some counted
-    measured costs instead of the wall clock's seconds, runs of different commits, of changed files,
-    and of different machines.
-    """
-    warnings = []
-    for scene in sorted({run.scene for run in runs}):
-        trained = [run for run in runs if run.scene == scene and run.result["steps"]]
-        if not trained:
-            continue
-        times = {run.folder: run.result["run_seconds"] for run in trained}
-        shortest, longest = min(times, key=times.__getitem__), max(times, key=times.__getitem__)
-        if times[longest] > (1 + MOST_TIME_APART) * times[shortest]:
-            warnings.append(
-                f"{scene}: the runs were not given the same time: {times[shortest]:.0f} s in "
-                f"{shortest}, {times[longest]:.0f} s in {longest}"
-            )
-    if changed := [r.folder for r in runs if any(v.get("dirty") for v in r.versions)]:
-        warnings.append(
-            f"{len(changed)} run(s) were made with uncommitted changes, for example {changed[0]}"
-        )
-    for what, value in (
-        ("were made with different commits", _commits),
-        ("were timed by different clocks", _clock),
-        ("come from different machines", _machine),
-    ):
-        first: dict[str, Path] = {}
-        for run in runs:
-            first.setdefault(value(run), run.folder)
-        if len(first) > 1:
-            found = "; ".join(f"{name} in {folder}" for name, folder in first.items())
-            warnings.append(f"the runs {what}: {found}")
-            if value is _commits and _one_program(runs):
-                warnings[-1] += "; the program itself is the same"
-    return warnings
-
-
-def _clock(run: Run) -> str:
-    """'wall', or 'model' where run time was counted with measured costs per step."""
-    clock: str = run.result.get("clock", "wall")
-    return clock
-
-
-def _commits(run: Run) -> str:
-    """Of all versions of the program that the run was made with, in order; changed ones by hash."""
-    return " then ".join(dict.fromkeys(map(_named, run.versions)))
-
-
-def _named(version: dict[str, Any]) -> str:
-    commit = str(version["commit"])[:12]
-    if not version.get("dirty"):
-        return commit
-    return f"{commit} and changes ({version['code'][:8]})" if "code" in version else commit
-
-
-def _one_program(runs: Sequence[Run]) -> bool:
-    """Whether all runs are known to be made with the same modules, whatever the commit."""
-    codes = {version.get("code") for run in runs for version in run.versions}
-    return len(codes) == 1 and None not in codes
-
-
-def _machine(run: Run) -> str:
-    machine = run.result.get("machine", {})
-    return f"{machine.get('processor')}, {machine.get('backend')}"
 
 
 def _require_equal(runs: Sequence[Run], what: str, value: Callable[[Run], str]) -> None:

@@ -46,6 +46,19 @@ def test_every_scene_of_a_sweep_is_there(sweep: str) -> None:
         assert name_of(scene, *own_words(sweep)) == scene
 
 
+@pytest.mark.parametrize("sweep", ["minute", "ours_hour", "rare"])
+def test_what_says_more_than_what_is_swept_over_has_a_folder_of_its_own(sweep: str) -> None:
+    folders = [
+        composed(*words, "scene=mirror", "method=ours").run.folder
+        for words in (
+            ["budget=small"],
+            [f"+sweeps={sweep}", "budget=small"],
+            [f"+sweeps={sweep}", "budget=smoke"],
+        )
+    ]
+    assert len(set(folders)) == 3
+
+
 @cache
 def name_of(scene: str, *more: str) -> str:
     name: str = composed(*more, f"scene={scene}").scene.name

@@ -13,13 +13,14 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from analysis.claim_tables import claims_table
+from analysis.doubts import comparison_warnings
 from analysis.exploration import exploration_table
 from analysis.frame_times import frame_table
 from analysis.methods import name_methods
 from analysis.pairs import ways_left_out
 from analysis.phases import phase_table
 from analysis.provenance import provenance_table
-from analysis.runs import Run, check_comparable, comparison_warnings, find_runs
+from analysis.runs import Run, check_comparable, find_runs
 from analysis.summary import compare, summarise
 from analysis.tables import comparison_table, cost_table, error_table, to_markdown
 from analysis.time_table import time_table

@@ -18,13 +18,12 @@ def table(figures: Sequence[Figure]) -> str:
 
 
 def markdown(figures: Sequence[Figure]) -> str:
-    """A table per part: a row per scene where scenes were rendered, else a row per figure."""
+    """Per part a table with a row per scene that was rendered, and one of all other figures."""
     parts: dict[str, list[Figure]] = {}
     for figure in figures:
         parts.setdefault(figure.part, []).append(figure)
     return "\n\n".join(
-        f"### {part}\n\n{_by_scene(group) if group[0].scene else _by_figure(group)}"
-        for part, group in parts.items()
+        "\n\n".join([f"### {part}", *_tables(group)]) for part, group in parts.items()
     )
 
 
@@ -47,6 +46,12 @@ def _quartiles(figure: Figure) -> str:
     return f" ({number(figure.lower)} – {number(figure.upper)})"
 
 
+def _tables(figures: Sequence[Figure]) -> list[str]:
+    of_scenes = [figure for figure in figures if figure.scene]
+    others = [figure for figure in figures if not figure.scene]
+    return [make(some) for make, some in ((_by_scene, of_scenes), (_by_figure, others)) if some]
+
+
 def _by_figure(figures: Sequence[Figure]) -> str:
     rows = [
         (f.name, f"{number(f.median)} {f.unit}{_quartiles(f)}", f.limit or " ") for f in figures
@@ -55,11 +60,11 @@ def _by_figure(figures: Sequence[Figure]) -> str:
 
 
 def _by_scene(figures: Sequence[Figure]) -> str:
-    columns = {f.name: _heading(f) for f in figures}
-    cells = {(f.scene, f.name): f"{number(f.median)}{_quartiles(f)}" for f in figures}
+    columns = list(dict.fromkeys(map(_heading, figures)))
+    cells = {(f.scene, _heading(f)): f"{number(f.median)}{_quartiles(f)}" for f in figures}
     scenes = dict.fromkeys(f.scene for f in figures)
-    rows = [(scene, *(cells.get((scene, name), "–") for name in columns)) for scene in scenes]
-    return _rows(("scene", *columns.values()), rows)
+    rows = [(scene, *(cells.get((scene, column), "–") for column in columns)) for scene in scenes]
+    return _rows(("scene", *columns), rows)
 
 
 def _heading(figure: Figure) -> str:

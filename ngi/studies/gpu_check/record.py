@@ -54,7 +54,7 @@ class Record:
 
     def done(self, item: Item, outcome: Outcome) -> None:
         """It came to an end."""
-        figures = [asdict(replace(f, part=item.stage)) for f in outcome.figures]
+        figures = [asdict(replace(f, part=_part(item, f))) for f in outcome.figures]
         self._keep(item, {"figures": figures, "notes": outcome.notes, **self._about})
 
     def fail(self, item: Item, error: Exception) -> None:
@@ -101,6 +101,11 @@ def page(items: Sequence[Item], entries: dict[str, Entry], *, about: dict[str, A
     parts += ["### Notes", "\n".join(notes)] if notes else []
     parts += ["### Missing", "\n".join(missing)] if missing else []
     return "\n\n".join(parts) + "\n"
+
+
+def _part(item: Item, figure: Figure) -> str:
+    """Its stage, and the part of it that the figure names."""
+    return ": ".join(filter(None, (item.stage, figure.part)))
 
 
 def _crashes(entry: Entry) -> bool:

@@ -12,10 +12,11 @@ import torch
 from hydra.errors import InstantiationException
 from torch import Tensor, nn
 
+from analysis.doubts import comparison_warnings
 from analysis.frame_times import frame_table
 from analysis.methods import name_methods
 from analysis.report_files import write_report
-from analysis.runs import comparison_warnings, find_runs
+from analysis.runs import find_runs
 from ngi.methods.path_tracing.frame_time import show
 from ngi.render import AnalyticRenderer
 from ngi.train import train

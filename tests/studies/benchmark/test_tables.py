@@ -42,3 +42,12 @@ def test_parts_that_come_in_turns_make_one_table_each() -> None:
         Figure("x", 1, 1, 1, "", part=part, scene=scene) for scene in "ab" for part in ("p", "q")
     ]
     assert markdown(turns).count("###") == 2
+
+
+def test_in_markdown_no_figure_hides_another_one_of_its_part() -> None:
+    one = Figure("step", 7, 7, 7, "ms", part="p", scene="salon")
+    figures = [one, replace(one, median=50, lower=50, upper=50, unit="%"), replace(one, scene="")]
+    text = markdown(figures)
+    assert cells(text.splitlines()[4]) == ["salon", "7", "50"]
+    assert cells(text.splitlines()[-1]) == ["step", "7 ms", ""]
+    assert text.count("###") == 1

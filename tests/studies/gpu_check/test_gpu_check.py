@@ -11,7 +11,7 @@ import pytest
 import torch
 
 from ngi.machine.provenance import provenance
-from ngi.studies.benchmark.figures import figure
+from ngi.studies.benchmark.figures import Figure, figure
 from ngi.studies.benchmark.scenes import one_per_folder
 from ngi.studies.gpu_check import runs
 from ngi.studies.gpu_check.__main__ import check, work
@@ -51,6 +51,18 @@ def checked(folder: Path, *every: Item, seconds: float = 1e6) -> Record:
     record = Record(folder, about=ABOUT)
     work(every, record, end=time.monotonic() + seconds)
     return Record(folder, about=ABOUT)
+
+
+def test_a_stage_of_several_parts_has_a_table_of_each(tmp_path: Path) -> None:
+    figures = [
+        Figure("step", 1, 1, 1, "ms", part="speed", scene="salon"),
+        Figure("step", 2, 2, 2, "%", part="share", scene="mirror"),
+    ]
+    item = Item("stage", "name", lambda _: Outcome(figures))
+    record = checked(tmp_path, item)
+    record.write_page([item])
+    headings = [line for line in record.page.read_text().splitlines() if line.startswith("### ")]
+    assert headings == ["### stage: speed", "### stage: share"]
 
 
 def test_what_is_measured_is_not_measured_again(tmp_path: Path) -> None:

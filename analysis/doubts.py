@@ -1,0 +1,121 @@
+"""What makes a comparison of runs doubtful without forbidding it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from analysis.runs import Run
+
+MOST_TIME_APART = 0.05
+"""Relative difference of run times up to which runs count as given the same time."""
+
+MOST_KEYS = 3
+"""Of the settings that differ, that are named."""
+
+MAY_DIFFER = ("seed", "costs")
+
+
+def comparison_warnings(runs: Sequence[Run]) -> list[str]:
+    """What makes a comparison doubtful without forbidding it, a line each.
+
+    Trained runs of one scene whose run times are more than 5 % apart, runs of which some counted
+    measured costs instead of the wall clock's seconds, runs of different commits, of changed files,
+    of different machines, and of one method and scene with different settings.
+    """
+    warnings = _of_different_settings(runs)
+    for scene in sorted({run.scene for run in runs}):
+        trained = [run for run in runs if run.scene == scene and run.result["steps"]]
+        if not trained:
+            continue
+        times = {run.folder: run.result["run_seconds"] for run in trained}
+        shortest, longest = min(times, key=times.__getitem__), max(times, key=times.__getitem__)
+        if times[longest] > (1 + MOST_TIME_APART) * times[shortest]:
+            warnings.append(
+                f"{scene}: the runs were not given the same time: {times[shortest]:.0f} s in "
+                f"{shortest}, {times[longest]:.0f} s in {longest}"
+            )
+    if changed := [r.folder for r in runs if any(v.get("dirty") for v in r.versions)]:
+        warnings.append(
+            f"{len(changed)} run(s) were made with uncommitted changes, for example {changed[0]}"
+        )
+    for what, value in (
+        ("were made with different commits", _commits),
+        ("were timed by different clocks", _clock),
+        ("come from different machines", _machine),
+    ):
+        first: dict[str, Path] = {}
+        for run in runs:
+            first.setdefault(value(run), run.folder)
+        if len(first) > 1:
+            found = "; ".join(f"{name} in {folder}" for name, folder in first.items())
+            warnings.append(f"the runs {what}: {found}")
+            if value is _commits and _one_program(runs):
+                warnings[-1] += "; the program itself is the same"
+    return warnings
+
+
+def _of_different_settings(runs: Sequence[Run]) -> list[str]:
+    """A line for every scene and method whose runs differ by more than their seeds.
+
+    As they do where what was chosen depends on the machine, the network of `budget=machine` for
+    example: their scatter is no scatter between seeds.
+    """
+    warnings = []
+    by_method: dict[tuple[str, str], list[Run]] = {}
+    for run in runs:
+        by_method.setdefault((run.scene, run.method), []).append(run)
+    for (scene, method), alike in sorted(by_method.items()):
+        settings = [_settings(run) for run in alike]
+        for run, own in zip(alike[1:], settings[1:], strict=True):
+            keys = sorted(settings[0].keys() | own.keys())
+            if apart := [key for key in keys if settings[0].get(key) != own.get(key)]:
+                shown = ", ".join(
+                    f"{key} ({settings[0].get(key)} and {own.get(key)})"
+                    for key in apart[:MOST_KEYS]
+                )
+                more = f" and {len(apart) - MOST_KEYS} more" if len(apart) > MOST_KEYS else ""
+                warnings.append(
+                    f"{scene}: runs of {method} differ in {shown}{more}: {alike[0].folder} and "
+                    f"{run.folder}"
+                )
+                break
+    return warnings
+
+
+def _settings(run: Run) -> dict[str, str]:
+    """What decides a run's result, but for its seed and the measured costs of its steps."""
+    config = {key: part for key, part in run.result["config"].items() if key not in MAY_DIFFER}
+    return {str(key): str(value) for key, value in pd.json_normalize(config).iloc[0].items()}
+
+
+def _clock(run: Run) -> str:
+    """'wall', or 'model' where run time was counted with measured costs per step."""
+    clock: str = run.result.get("clock", "wall")
+    return clock
+
+
+def _commits(run: Run) -> str:
+    """Of all versions of the program that the run was made with, in order; changed ones by hash."""
+    return " then ".join(dict.fromkeys(map(_named, run.versions)))
+
+
+def _named(version: dict[str, Any]) -> str:
+    commit = str(version["commit"])[:12]
+    if not version.get("dirty"):
+        return commit
+    return f"{commit} and changes ({version['code'][:8]})" if "code" in version else commit
+
+
+def _one_program(runs: Sequence[Run]) -> bool:
+    """Whether all runs are known to be made with the same modules, whatever the commit."""
+    codes = {version.get("code") for run in runs for version in run.versions}
+    return len(codes) == 1 and None not in codes
+
+
+def _machine(run: Run) -> str:
+    machine = run.result.get("machine", {})
+    return f"{machine.get('processor')}, {machine.get('backend')}"
