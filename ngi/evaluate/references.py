@@ -5,6 +5,7 @@ import json
 import logging
 import math
 import os
+import secrets
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -75,7 +76,7 @@ def write_reference(path: Path, reference: Reference) -> None:
 
     Several processes may write the same one. Raises OSError with what to do where that fails.
     """
-    partial = path.with_suffix(f".{os.getpid()}{PARTIAL_SUFFIX}")
+    partial = path.with_suffix(f".{secrets.token_hex(8)}{PARTIAL_SUFFIX}")
     try:
         with full_disk_named(path):
             path.parent.mkdir(parents=True, exist_ok=True)

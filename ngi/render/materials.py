@@ -7,7 +7,7 @@ knows no roughness; here both are looked up in the BSDF's parameters.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from ngi.machine.backend import dr, mi
 Lookup = Callable[..., Any]
 """(hit: SurfaceInteraction3f, active: Bool) -> Color3f or Float."""
 
-_WRAPPERS = {"TwoSidedBRDF": "brdf_0", "BumpMap": "nested_bsdf", "NormalMap": "nested_bsdf"}
+_WRAPPERS = ("BumpMap", "NormalMap")
 
 
 @dataclass(frozen=True)
@@ -66,11 +66,17 @@ def has_bsdf(hit: mi.SurfaceInteraction3f, bsdf: mi.BSDF, active: mi.Bool) -> mi
 
 
 def _material(bsdf: mi.BSDF) -> Material:
-    inner, children = bsdf, children_of(bsdf)
-    while inner.class_name() in _WRAPPERS:
-        inner = children[_WRAPPERS[inner.class_name()]]
-        children = children_of(inner)
-    kind = inner.class_name()
+    return replace(_inside(bsdf, bsdf), bsdf=bsdf)
+
+
+def _inside(inner: mi.BSDF, bsdf: mi.BSDF) -> Material:
+    """Of what is inside `bsdf`, which errors name."""
+    kind, children = inner.class_name(), children_of(inner)
+    if kind == "TwoSidedBRDF":
+        front, back = (_inside(children[side], bsdf) for side in ("brdf_0", "brdf_1"))
+        return front if children["brdf_0"] == children["brdf_1"] else _two_sided(front, back)
+    if kind in _WRAPPERS:
+        return _inside(children["nested_bsdf"], bsdf)
     if kind not in _KINDS:
         raise ValueError(
             f"BSDF '{bsdf.id()}' is of kind {kind}, whose albedo and roughness are not known; "
@@ -79,7 +85,32 @@ def _material(bsdf: mi.BSDF) -> Material:
     albedo_name, roughness_of = _KINDS[kind]
     roughness, constant = roughness_of(inner, children)
     texture = children.get(albedo_name)
-    return Material(bsdf, colour(texture), roughness, constant, _constant_colour(texture))
+    return Material(inner, colour(texture), roughness, constant, _constant_colour(texture))
+
+
+def _two_sided(front: Material, back: Material) -> Material:
+    """What the side that is seen has."""
+
+    def of_side(name: str) -> Lookup:
+        sides = [getattr(side, name) for side in (front, back)]
+
+        def lookup(hit: mi.SurfaceInteraction3f, active: mi.Bool) -> Any:
+            from_front = mi.Frame3f.cos_theta(hit.wi) > 0
+            return dr.select(from_front, *(side(hit, active) for side in sides))
+
+        return lookup
+
+    def of_both(name: str) -> Any:
+        value = getattr(front, name)
+        return value if value == getattr(back, name) else None
+
+    return Material(
+        front.bsdf,
+        of_side("albedo"),
+        of_side("roughness"),
+        of_both("constant_roughness"),
+        of_both("constant_albedo"),
+    )
 
 
 def children_of(bsdf: mi.BSDF) -> dict[str, mi.Object]:

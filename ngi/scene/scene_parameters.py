@@ -101,11 +101,11 @@ class SceneParameters(Parameters):
         return emission.set_colour
 
     def _emission(self, object_id: str) -> Emission:
-        key = self.find(
-            object_id,
-            ("radiance.value", "intensity.value", "irradiance.value", "scale"),
-            hint="name an emitter, or the shape that carries it, with a constant radiance",
-        )
+        hint = "name an emitter, or the shape that carries it, with a constant radiance"
+        names = ("radiance.value", "intensity.value", "irradiance.value", "scale")
+        key = self.find(object_id, names, hint=hint)
+        if key.endswith(".scale") and not isinstance(self.owner(key), mi.Emitter):
+            raise ValueError(f"{self._file}: {key} of '{object_id}' is no emitter's; {hint}")
         if key not in self._emissions:  # which may be known by its own id and by its shape's
             self._emissions[key] = Emission(self, key)
         return self._emissions[key]

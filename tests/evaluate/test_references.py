@@ -130,6 +130,29 @@ def test_failed_write_leaves_nothing_behind(renderer, protocol, tmp_path, monkey
     assert not list(tmp_path.iterdir())
 
 
+def test_one_reference_may_be_written_twice_at_once(
+    renderer, protocol, tmp_path, monkeypatch
+) -> None:
+    """By two processes of the same number, in containers that share the cache."""
+    save, writes = np.savez_compressed, []
+
+    def meanwhile(*arguments: object, **named: object) -> None:
+        writes.append(1)
+        if len(writes) == 1:
+            ReferenceCache(tmp_path).get(renderer, protocol, V)
+        save(*arguments, **named)
+
+    monkeypatch.setattr(np, "savez_compressed", meanwhile)
+    reference = ReferenceCache(tmp_path).get(renderer, protocol, V)
+    assert len(writes) == 2
+    (file,) = tmp_path.iterdir()
+    renderer.seeds.clear()
+    assert (
+        ReferenceCache(tmp_path).get(renderer, protocol, V).content_hash == reference.content_hash
+    )
+    assert not renderer.seeds, f"{file} was not read"
+
+
 def test_pixels_that_are_sometimes_not_finite_are_left_out(
     renderer, protocol, tmp_path, monkeypatch
 ) -> None:

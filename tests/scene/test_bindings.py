@@ -1,6 +1,7 @@
 """What scene.yaml asks of a loaded scene that cannot be done is said when it is loaded."""
 
 import copy
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -40,6 +41,17 @@ def second_instance(root) -> None:
     instance = root.makeelement("shape", {"type": "instance", "id": "wedge_2"})
     instance.append(root.makeelement("ref", {"id": "wedge_group"}))
     root.append(instance)
+
+
+def bumpy(root) -> None:
+    back = find(root, "back")
+    back.remove(back.find("ref"))
+    bump = ElementTree.fromstring(
+        """<bsdf type="bumpmap"><float name="scale" value="2"/><bsdf type="diffuse"/>
+        <texture type="bitmap" name="arbitrary"><string name="filename" value="plain.png"/>
+        </texture></bsdf>"""
+    )
+    back.append(bump)
 
 
 def second_camera(root) -> None:
@@ -92,6 +104,11 @@ def other_mesh(folder) -> None:
             {"scene": "field"},
         ),
         ({"object": "ball", **RADIANCE}, "'ball' .* name an emitter", {}),
+        (
+            {"object": "back", "property": "intensity", "minimum": 0, "maximum": 2},
+            "back.*scale of 'back' is no emitter's; name an emitter",
+            {"edit": bumpy},
+        ),
         ({"object": "picture", **ALBEDO}, "name a BSDF whose reflectance is given as <rgb>", {}),
         ({"object": "paint", **TURN}, "'paint' .* it has no place that could vary", {}),
         ({"object": "light", **HIDE}, "an emitter cannot be hidden", {}),
