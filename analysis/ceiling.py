@@ -8,9 +8,11 @@ from collections.abc import Hashable, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from analysis.command import errors_in_a_line
+from analysis.runs import METRICS, SETS
 from analysis.statistics import Estimate, paired_difference
 from analysis.tables import MISSING, Cell, Table, format_percent, to_markdown
 
@@ -52,7 +54,19 @@ def read_runs(folder: Path) -> pd.DataFrame:
     if not again.empty:
         first, second = again.sort_values(RUN)["file"].iloc[:2]
         raise ValueError(f"{first} and {second} are the same run; give the folder of one study")
-    return runs.drop(columns="file")
+    return _comparable(runs.drop(columns="file"))
+
+
+def _comparable(runs: pd.DataFrame) -> pd.DataFrame:
+    """The same runs, all of them by three metrics where some lack LPIPS, whose weights came late.
+
+    A run that diverged, which lacks all metrics, is compared by none.
+    """
+    for frames in SETS:
+        lpips, others = f"{frames}_lpips", [f"{frames}_{name}" for name in METRICS[:-1]]
+        if lpips in runs and (runs[lpips].isna() & runs[others].notna().all(axis=1)).any():
+            runs[f"{frames}_error"] = np.exp(runs[others].apply(np.log).mean(axis=1, skipna=False))
+    return runs
 
 
 def differences(runs: pd.DataFrame) -> pd.DataFrame:

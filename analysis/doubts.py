@@ -16,8 +16,6 @@ MOST_TIME_APART = 0.05
 MOST_KEYS = 3
 """Of the settings that differ, that are named."""
 
-MAY_DIFFER = ("seed", "costs")
-
 
 def comparison_warnings(runs: Sequence[Run]) -> list[str]:
     """What makes a comparison doubtful without forbidding it, a line each.
@@ -69,7 +67,7 @@ def _of_different_settings(runs: Sequence[Run]) -> list[str]:
     for run in runs:
         by_method.setdefault((run.scene, run.method), []).append(run)
     for (scene, method), alike in sorted(by_method.items()):
-        settings = [_settings(run) for run in alike]
+        settings = [_settings(run.result["config"]) for run in alike]
         for run, own in zip(alike[1:], settings[1:], strict=True):
             keys = sorted(settings[0].keys() | own.keys())
             if apart := [key for key in keys if settings[0].get(key) != own.get(key)]:
@@ -86,10 +84,11 @@ def _of_different_settings(runs: Sequence[Run]) -> list[str]:
     return warnings
 
 
-def _settings(run: Run) -> dict[str, str]:
-    """What decides a run's result, but for its seed and the measured costs of its steps."""
-    config = {key: part for key, part in run.result["config"].items() if key not in MAY_DIFFER}
-    return {str(key): str(value) for key, value in pd.json_normalize(config).iloc[0].items()}
+def _settings(config: dict[str, Any]) -> dict[str, Any]:
+    """By key, what decides a run's result, but for seeds and the measured costs of its steps."""
+    found = pd.json_normalize({key: part for key, part in config.items() if key != "costs"})
+    settings = {str(key): value for key, value in found.iloc[0].items()}
+    return {key: value for key, value in settings.items() if key.split(".")[-1] != "seed"}
 
 
 def _clock(run: Run) -> str:

@@ -27,6 +27,7 @@ def check_result(result: dict[str, Any]) -> None:
     """
     for recorded in result.get("logs", {}).values():
         _ = recorded["bytes"], recorded["sha256"]
+    _ = result["config"].items()
     for key in ("machine", "versions"):
         _ = result.get(key, {}).items()
     for version in result.get("commits", []):

@@ -27,6 +27,7 @@ class Material:
     albedo: diffuse, specular or base reflectance, linear RGB; 1 where the BSDF absorbs nothing.
     roughness: alpha; 1 for a diffuse BSDF and 0 for a perfectly smooth one.
     constant_roughness, constant_albedo: the value where it is the same everywhere, else None.
+    other_front: what its front has, where its two sides differ.
     """
 
     bsdf: mi.BSDF
@@ -34,6 +35,13 @@ class Material:
     roughness: Lookup
     constant_roughness: float | None
     constant_albedo: tuple[float, ...] | None
+    other_front: Material | None = None
+
+    @property
+    def front(self) -> Material:
+        """What its front has."""
+        front = self.other_front
+        return self if front is None else replace(front, bsdf=self.bsdf)
 
 
 def collect_materials(bsdfs: list[mi.BSDF]) -> list[Material]:
@@ -110,6 +118,7 @@ def _two_sided(front: Material, back: Material) -> Material:
         of_side("roughness"),
         of_both("constant_roughness"),
         of_both("constant_albedo"),
+        other_front=front,
     )
 
 

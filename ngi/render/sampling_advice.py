@@ -60,8 +60,10 @@ def _rare(scene: VariableScene, materials: list[Material]) -> list[str]:
     ]
     if not lights:
         return causes
-    roughness = [m.constant_roughness for m in materials if m.constant_roughness is not None]
-    if min(roughness, default=1.0) <= SHINY or any(map(_polishes, variables)):
+    roughness = [material.front.constant_roughness for material in materials]
+    if min((alpha for alpha in roughness if alpha is not None), default=1.0) <= SHINY or any(
+        map(_polishes, variables)
+    ):
         causes.append("smooth surfaces make caustics")
     return causes
 

@@ -159,12 +159,13 @@ def specular_chain(
     highlights: see `SpecularChain`; for nothing where no surface has two branches.
     """
     scene.apply(np.zeros(scene.description.dimensions))  # every roughness at its minimum
-    lowest = [m.constant_roughness for m in collect_materials([m.bsdf for m in materials])]
+    fronts = [material.front for material in materials]
+    lowest = [m.front.constant_roughness for m in collect_materials([m.bsdf for m in fronts])]
     surfaces = [
         surface
-        for material, roughness in zip(materials, lowest, strict=True)
+        for front, roughness in zip(fronts, lowest, strict=True)
         if (roughness is None or roughness <= SPECULAR_ROUGHNESS)
-        and (surface := specular_surface(material)) is not None
+        and (surface := specular_surface(front)) is not None
     ]
     bounces, longest_path = MAX_SPECULAR_BOUNCES, scene.description.max_depth
     if longest_path >= 0:  # -1: no limit

@@ -8,11 +8,12 @@ instance, so that its vertices are never rewritten.
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from xml.etree import ElementTree
 
 import numpy as np
 
-from ngi.scene.assets import authored_to_world
+from ngi.scene.assets import to_world
 from ngi.scene.kinds import KeyFrames, Rotation, Scale, Shape, Translation, Visibility
 from ngi.scene.scene_files import SceneFile
 from ngi.scene.variable import Variable
@@ -31,7 +32,8 @@ WORTHWHILE = 100_000
 def arranged(
     document: SceneFile, variables: Sequence[Variable], *, worthwhile: int = WORTHWHILE
 ) -> SceneFile:
-    """The same scene, arranged for these variables; as it is where no shape moves.
+    """The same scene, arranged for these variables; as it is where no shape moves. Needs an active
+    variant of Mitsuba.
 
     Emitters stay where they are: Mitsuba does not allow them in groups. Ids are kept; that of a
     mesh that became an instance is the instance's.
@@ -57,7 +59,7 @@ def arranged(
             group = ElementTree.SubElement(root, "shape", type="shapegroup", id=f"ngi_{name}")
             group.append(shape)
             instance = _add_instance(root, str(name), of=group)
-            _hand_over_place(document, str(name), shape=shape, instance=instance)
+            _hand_over_place(document, shape=shape, instance=instance)
     if static and sum(_mesh_size(document, shape) for shape in static) >= worthwhile:
         group = ElementTree.SubElement(root, "shape", type="shapegroup", id="ngi_static_group")
         for shape in static:
@@ -68,15 +70,16 @@ def arranged(
 
 
 def _hand_over_place(
-    document: SceneFile, name: str, *, shape: ElementTree.Element, instance: ElementTree.Element
+    document: SceneFile, *, shape: ElementTree.Element, instance: ElementTree.Element
 ) -> None:
     """Makes a shape's to_world the instance's, so that this has its origin.
 
     Of one that mirrors only the origin: Mitsuba turns a mirrored mesh inside out, but no mirrored
-    instance of it.
+    instance of it. What Mitsuba does not read is for `load` to tell.
     """
-    transforms = shape.findall("transform")
-    matrix = authored_to_world(document, name) if transforms else np.eye(4)
+    transforms, matrix = shape.findall("transform"), np.eye(4)
+    with suppress(RuntimeError):
+        matrix = to_world(document, shape)
     if np.linalg.det(matrix[:3, :3]) < 0:
         (own,) = transforms
         handed = ElementTree.Element("transform", dict(own.attrib))

@@ -54,8 +54,13 @@ class Bitmap:
 
 def authored_to_world(document: SceneFile, object_id: str) -> Values:
     """[4, 4]: of a shape that does not show it once loaded, such as a mesh."""
+    return to_world(document, _shape(document, object_id))
+
+
+def to_world(document: SceneFile, shape: ElementTree.Element) -> Values:
+    """[4, 4]: of an element of a document. RuntimeError, as Mitsuba words it, for mistakes."""
     rectangle = ElementTree.Element("shape", type="rectangle")
-    rectangle.extend(_shape(document, object_id).findall("transform"))
+    rectangle.extend(shape.findall("transform"))
     matrix = mi.traverse(_loaded(document, rectangle))["to_world"].matrix
     return np.array(matrix, dtype=np.float64).reshape(4, 4)
 

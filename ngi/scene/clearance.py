@@ -143,8 +143,8 @@ def out_of_bounds(scene: VariableScene) -> list[str]:
         for shape, instance in scene.placed():
             name = shape.id() if instance is None or instance.id() == STATIC else instance.id()
             if name not in hidden:
-                corners = _corners(shape, instance)
-                out = float(np.maximum(low - corners, corners - high).max())
+                points = _outline(shape, instance)
+                out = float(np.maximum(low - points, points - high).max())
                 farthest[name] = max(farthest.get(name, 0.0), out)
     size = float(np.linalg.norm(high - low))
     return [
@@ -154,14 +154,20 @@ def out_of_bounds(scene: VariableScene) -> list[str]:
     ]
 
 
-def _corners(shape: mi.Shape, instance: mi.Shape | None) -> Points:
-    """[8, 3]: of the box of a shape, where the instance that shows it has put it."""
-    box = shape.bbox()
-    corners = np.array(list(product(*zip(np.ravel(box.min), np.ravel(box.max), strict=True))))
+def _outline(shape: mi.Shape, instance: mi.Shape | None) -> Points:
+    """[n, 3]: points that a shape does not reach beyond, where its instance has put it.
+
+    The vertices of a mesh in an instance, which may turn, else the corners of the shape's box.
+    """
+    if instance is not None and isinstance(shape, mi.Mesh):
+        points = np.array(mi.traverse(shape)["vertex_positions"], np.float64).reshape(-1, 3)
+    else:
+        box = shape.bbox()
+        points = np.array(list(product(*zip(np.ravel(box.min), np.ravel(box.max), strict=True))))
     if instance is None:
-        return corners
+        return points
     matrix = np.array(mi.traverse(instance)["to_world"].matrix, np.float64).reshape(4, 4)
-    return corners @ matrix[:3, :3].T + matrix[:3, 3]
+    return points @ matrix[:3, :3].T + matrix[:3, 3]
 
 
 def meeting_views(description: SceneDescription) -> list[str]:

@@ -42,6 +42,7 @@ def moving_points(scene: VariableScene) -> MovingPoints:
     """
     description = scene.description
     v = description.with_first_materials(np.full(description.dimensions, 0.5))
+    scene.apply(v)
     moved = [
         _moved(scene, variable, part, v)
         for variable, part in description.parts()
@@ -64,11 +65,16 @@ def _seen(scene: VariableScene, variable: Variable) -> bool:
 
 
 def _moved(scene: VariableScene, variable: Variable, part: slice, v: NDArray[np.float64]) -> _Moved:
+    """v: [D] that the scene is at, and is left at."""
     owners = scene.owners(variable)
     boxes = []
     for name, owner in zip(variable.objects, owners, strict=True):
-        scene.apply(_showing(scene.description, name, v))
+        shown = _showing(scene.description, name, v)
+        if changed := not np.array_equal(shown, v):
+            scene.apply(shown)
         boxes.append(_box(owner))
+        if changed:
+            scene.apply(v)
     low, high = np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1]
     count = part.stop - part.start
     start = variable.value(np.zeros(count))

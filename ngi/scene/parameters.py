@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from contextlib import contextmanager
 from difflib import get_close_matches
 from pathlib import Path
@@ -30,7 +30,7 @@ class Parameters:
         self._changes = Changes(scene, self._parameters)
         self._file = document.path
         self._found: set[str] = set()
-        self._taken: dict[str, str] = {}
+        self._taken: dict[Hashable, str] = {}
         self._taker = ""
         self._objects = {
             node.id(): node
@@ -58,20 +58,20 @@ class Parameters:
         finally:
             self._taker = ""
 
-    def take(self, what: str) -> None:
-        """ValueError where another variable sets it already, by whatever name.
+    def take(self, what: Hashable, *, name: str) -> None:
+        """ValueError, with its name, where another variable sets it already.
 
         Of two the last to change would win, so that the same v were not always the same scene.
         """
         if (other := self._taken.setdefault(what, self._taker)) != self._taker:
-            raise ValueError(f"it sets {what}, as {other} does; leave one of the two out")
+            raise ValueError(f"it sets {name}, as {other} does; leave one of the two out")
 
     def parameter(
         self, object_id: str, suffixes: tuple[str, ...], *, hint: str, of: Sequence[str] = ()
     ) -> str:
         """As `find`, for one variable alone: ValueError as `take`."""
         key = self.find(object_id, suffixes, hint=hint, of=of)
-        self.take(key)
+        self.take(key, name=key)
         return key
 
     def find(

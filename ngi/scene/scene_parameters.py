@@ -51,26 +51,26 @@ class SceneParameters(Parameters):
     def placement(
         self, object_id: str, *, only: Sequence[str] = (), finite: bool = False
     ) -> Placement:
-        """Where an object stands, the same for all variables that act on it.
+        """Where an object stands, the same for all variables that act on it, by whatever name.
 
         only: Mitsuba's classes of what can stand so; all where empty. finite: not what is
         infinitely far away.
         """
         owner = self.object(object_id)
+        if only and owner.class_name() not in only:
+            raise ValueError(
+                f"{self._file}: '{object_id}' is a {owner.class_name()}; name one of {list(only)}"
+            )
+        body = self._body(object_id, owner)
         if finite and _infinite(owner):
             raise ValueError(
                 f"{self._file}: '{object_id}' is infinitely far away, as every "
                 f"{owner.class_name()}; vary its rotation or, of a sun, its direction"
             )
-        if only and owner.class_name() not in only:
-            raise ValueError(
-                f"{self._file}: '{object_id}' is a {owner.class_name()}; name one of {list(only)}"
-            )
-        if object_id not in self._placements:
-            self._placements[object_id] = Placement(
-                self._body(object_id, owner), parking=None if emits(owner) else parking(self._size)
-            )
-        return self._placements[object_id]
+        if body.key not in self._placements:  # a group has that of what is in it
+            parked = None if emits(owner) else parking(self._size)
+            self._placements[body.key] = Placement(body, parking=parked)
+        return self._placements[body.key]
 
     def _body(self, object_id: str, owner: mi.Object) -> Body:
         # Not every mi.Mesh is one of vertices: a rectangle has a to_world.
@@ -86,13 +86,13 @@ class SceneParameters(Parameters):
     def intensity(self, object_id: str) -> Write:
         """A function that sets the factor [1] on an emitter's colour."""
         emission = self._emission(object_id)
-        self.take(f"the intensity of {emission.key}")
+        self.take(("intensity", emission.key), name=f"the intensity of {emission.key}")
         return emission.set_factor
 
     def radiance(self, object_id: str) -> Write:
         """A function that sets an emitter's colour [3]."""
         emission = self._emission(object_id)
-        self.take(f"the colour of {emission.key}")
+        self.take(("colour", emission.key), name=f"the colour of {emission.key}")
         if emission.colour.size != 3:
             raise ValueError(
                 f"{self._file}: radiance of '{object_id}': it holds {emission.colour.size} "
@@ -114,7 +114,7 @@ class SceneParameters(Parameters):
         """A function that gives a shape, or all of an instance's, the BSDF of an index [1]."""
         shapes = self.dressed(object_id)
         for shape in shapes:
-            self.take(f"the material of '{shape.id()}'")
+            self.take(shape, name=f"the material of '{shape.id() or shape.class_name()}'")
         choices = [self.object(name) for name in bsdfs]
         for name, choice in zip(bsdfs, choices, strict=True):
             if not isinstance(choice, mi.BSDF):
@@ -170,9 +170,13 @@ class SceneParameters(Parameters):
         super().update()
 
     def groups(self) -> list[tuple[mi.Shape, mi.Shape]]:
-        """The group that each instance shows, and the instance."""
+        """The group that each instance shows, and the instance, in the order of the file."""
+        by_id = {node.id(): node for node in self.objects(mi.Shape)}
+        instances = [s for s in self.objects(mi.Shape) if s.class_name().startswith("Instance")]
+        references = self.document.root.iterfind(".//shape[@type='instance']/ref")
         return [
-            (self.object(group), self.object(name)) for name, group in self._references().items()
+            (by_id[ref.get("id", "")], instance)
+            for ref, instance in zip(references, instances, strict=True)
         ]
 
     def _references(self) -> dict[str, str]:

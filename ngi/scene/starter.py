@@ -89,6 +89,8 @@ def _word(text: str) -> str:
 def _entries(node: mi.Object, scene: mi.Scene) -> dict[str, str]:
     """Property -> the rest of its entry, with a range to start from."""
     if isinstance(node, mi.Sensor):
+        if node != scene.sensors()[0]:  # it is not rendered
+            return {}
         return {"look_at": _views(node, scene), **_field_of_view(node)}
     if isinstance(node, mi.Emitter):
         return _light(node, _step(scene))

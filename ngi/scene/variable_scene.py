@@ -58,13 +58,15 @@ class VariableScene:
             raise ValueError(f"{prefix}{error}") from error
 
     def _check_camera(self, variable: Variable) -> None:
-        rendered = self.scene.sensors()[0]
-        for owner in () if isinstance(variable, DiscreteVariable) else self.owners(variable):
-            if isinstance(owner, mi.Sensor) and owner != rendered:
-                raise ValueError(
-                    f"'{owner.id()}' is not rendered, for the first sensor of the file is "
-                    f"'{rendered.id()}'; name that one, or put the other first"
-                )
+        """ValueError for what would only place cameras that are not rendered."""
+        owners = [] if isinstance(variable, DiscreteVariable) else self.owners(variable)
+        first = next(iter(self.scene.sensors()), None)
+        if owners and all(isinstance(owner, mi.Sensor) and owner != first for owner in owners):
+            name = f", '{first.id()}'," if first is not None and first.id() else ""
+            raise ValueError(
+                f"'{owners[0].id()}' is not rendered, but the first sensor of the file{name} is; "
+                "name that one, or put this one first"
+            )
 
     @cached_property
     def moving(self) -> frozenset[str]:

@@ -1,5 +1,6 @@
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 from scipy import stats
@@ -7,6 +8,7 @@ from scipy import stats
 from analysis.ceiling import (
     EVERYWHERE,
     NO_CHOICE,
+    RUN,
     concentration,
     differences,
     main,
@@ -22,6 +24,29 @@ def write(folder: Path, *rows: str) -> None:
         file = folder / row.split(",")[0] / "runs" / f"{number}.csv"
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(HEADER + row + "\n")
+
+
+METRICS = ("mape", "dssim", "mae", "lpips")
+
+
+def test_runs_with_and_without_lpips_are_compared_by_what_all_have(tmp_path: Path) -> None:
+    """Its weights may come while a study goes on; of a run that diverged there are no metrics."""
+    rows = [
+        dict(zip((*METRICS, "error"), numbers, strict=True))
+        for numbers in ([2.0, 4, 8, 64, 8], [2, 4, 8, None, 4], [None] * 5)
+    ]
+    for seed, row in enumerate(rows):
+        run = dict(zip(RUN, ("room", 64, 400, "uniform", seed), strict=True))
+        named = {f"{frames}_{key}": row[key] for frames in ("hard", "uniform") for key in row}
+        folder = tmp_path / "runs"
+        folder.mkdir(exist_ok=True)
+        pd.DataFrame([run | named]).to_csv(folder / f"{seed}.csv", index=False)
+    (tmp_path / "runs/1.csv").rename(tmp_path / "later")
+    assert read_runs(tmp_path)["hard_error"].tolist() == pytest.approx([8, np.nan], nan_ok=True)
+    (tmp_path / "later").rename(tmp_path / "runs/1.csv")
+    for frames in ("hard", "uniform"):
+        found = read_runs(tmp_path)[f"{frames}_error"]
+        assert found.tolist() == pytest.approx([4, 4, np.nan], nan_ok=True)
 
 
 def study(folder: Path) -> None:

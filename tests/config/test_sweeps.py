@@ -47,7 +47,7 @@ def test_every_scene_of_a_sweep_is_there(sweep: str) -> None:
 
 
 @pytest.mark.parametrize("sweep", ["minute", "ours_hour", "rare"])
-def test_what_says_more_than_what_is_swept_over_has_a_folder_of_its_own(sweep: str) -> None:
+def test_runs_of_these_are_not_in_the_way_of_plain_ones(sweep: str) -> None:
     folders = [
         composed(*words, "scene=mirror", "method=ours").run.folder
         for words in (

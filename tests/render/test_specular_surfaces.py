@@ -113,6 +113,17 @@ def test_a_conductor_from_behind(load_specular, backend, two_sided) -> None:
     np.testing.assert_allclose(seen["throughput"][met], 0.8 if two_sided else 1, rtol=1e-5)
 
 
+@pytest.mark.parametrize(("alpha", "buffers_more"), [("0.5", False), ("0.001", True), ("0", True)])
+def test_of_two_sides_the_front_decides(load_specular, backend, alpha, buffers_more) -> None:
+    kind = "conductor" if alpha == "0" else "roughconductor"
+    rough = "" if alpha == "0" else f'<float name="alpha" value="{alpha}"/>'
+    sides = f'<bsdf type="{kind}">{rough}</bsdf><bsdf type="diffuse"/>'
+    mirror = rectangle("mirror", TILTED, f'<bsdf type="twosided">{sides}</bsdf>')
+    names = load_specular(BACK + SIDE + SKY + mirror, backend=backend).layout.names
+    assert ("throughput" in names) == buffers_more
+    assert ("chain_roughness" in names) == (alpha == "0.001")
+
+
 def test_a_mapped_mirror_is_not_followed(load_specular, backend) -> None:
     bumps = '<bsdf type="bumpmap"><texture type="bitmap" name="arbitrary">\
 <string name="filename" value="picture.png"/></texture>{}</bsdf>'

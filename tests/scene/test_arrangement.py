@@ -146,6 +146,40 @@ def test_a_mirrored_mesh_that_moves_shows_the_same_side(make_scene) -> None:
     np.testing.assert_allclose(placement.origin, [-0.1, 1, -0.5], atol=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("mistake", "message"),
+    [
+        ('<transform name="to_world"><translate x="abc"/></transform>', r'value "abc"'),
+        ('<transform name="to_world"><translat/></transform>', "translat"),
+    ],
+)
+def test_a_mistake_in_the_place_of_what_moves_is_told_with_its_line(
+    make_scene, mistake, message
+) -> None:
+    activate("scalar")
+
+    def edit(root) -> None:
+        curtain = root.find(".//*[@id='curtain']")
+        curtain.remove(curtain.find("transform"))
+        curtain.append(ElementTree.fromstring(mistake))
+
+    entry = {"object": "curtain", "property": "translation", "minimum": [0, 0, 0]}
+    folder = make_scene("stage", [{**entry, "maximum": [1, 0, 0]}], dimensions=1, edit=edit)
+    with pytest.raises(ValueError, match=rf"scene\.xml.*line.*{message}|{message}.*line"):
+        VariableScene(read_scene(folder))
+
+
+def test_an_id_with_a_quotation_mark_may_move(make_scene) -> None:
+    activate("scalar")
+
+    def edit(root) -> None:
+        root.find(".//*[@id='curtain']").set("id", "cur'tain")
+
+    entry = {"object": "cur'tain", "property": "translation", "minimum": [0, 0, 0]}
+    folder = make_scene("stage", [{**entry, "maximum": [1, 0, 0]}], dimensions=1, edit=edit)
+    VariableScene(read_scene(folder)).apply([0.5])
+
+
 def test_small_scenes_keep_their_shapes_and_large_ones_do_not(tmp_path) -> None:
     named = XML.replace(
         '<shape type="ply" id="curtain"/>',

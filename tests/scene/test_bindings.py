@@ -60,6 +60,11 @@ def second_camera(root) -> None:
     root.append(other)
 
 
+def nameless(root) -> None:
+    second_camera(root)
+    del find(root, "camera").attrib["id"]
+
+
 @pytest.fixture
 def load(make_scene):
     def load_with(entry, *, scene="stage", edit=None, files=None):
@@ -128,9 +133,10 @@ def other_mesh(folder) -> None:
         ),
         (
             {"object": "other", **LOOK},
-            "'other' is not rendered, for the first sensor of the file is 'camera'",
+            "'other' is not rendered, but the first sensor of the file, 'camera', is",
             {"edit": second_camera},
         ),
+        ({"object": "other", **WIDE}, "the first sensor of the file is; name", {"edit": nameless}),
         ({"object": "other", **WIDE}, "'other' is not rendered", {"edit": second_camera}),
         (
             {"object": "ball", **LOOK},
@@ -233,6 +239,48 @@ def test_two_variables_may_not_set_the_same_thing(make_scene, entries, what) -> 
     first, second = (f"{entry['object']}.{entry['property']}" for entry in entries)
     with pytest.raises(ValueError, match=f"{second}: it sets {what}.*, as {first} does"):
         VariableScene(read_scene(folder))
+
+
+def test_materials_of_two_nameless_shapes_may_vary(make_scene) -> None:
+    activate("scalar")
+
+    def edit(root) -> None:
+        del find(root, "wedge_mesh").attrib["id"]  # the cube has none
+
+    entries = [material("wedge_group", "paint", "blue"), material("cube_group", "blue", "paint")]
+    scene = VariableScene(read_scene(make_scene("stage", entries, dimensions=2, edit=edit)))
+    scene.apply([0, 1])
+
+
+def test_a_group_and_what_is_in_it_are_moved_as_one(make_scene) -> None:
+    """So that the way to a v makes no difference."""
+    activate("scalar")
+    move = {**MOVE, "maximum": [1, 0, 0]}
+    entries = [{"object": name, **move} for name in ("ball", "ball_group")]
+
+    def edit(root) -> None:
+        ball, group = find(root, "ball"), ElementTree.SubElement(root, "shape", type="shapegroup")
+        group.set("id", "ball_group")
+        root.remove(ball)
+        group.append(ball)
+        instance = ElementTree.SubElement(root, "shape", type="instance", id="shown")
+        ElementTree.SubElement(instance, "ref", id="ball_group")
+
+    scene = VariableScene(read_scene(make_scene("stage", entries, dimensions=2, edit=edit)))
+    places = []
+    for v in ([0, 0], [1, 0], [1, 1], [1, 0]):
+        scene.apply(v)
+        ball = next(shape for shape in scene.shapes if shape.id() == "ball")
+        places.append(round(float(np.ravel(ball.bbox().center())[0]), 4))
+    assert places == [0, 1, 2, 1]
+
+
+def test_two_cameras_may_be_led_together(load) -> None:
+    load({"object": ["camera", "other"], **LOOK}, edit=second_camera)
+
+
+def test_a_scene_without_a_camera_loads(load) -> None:
+    load({"object": "paint", **ALBEDO}, edit=lambda root: root.remove(find(root, "camera")))
 
 
 def test_two_variables_may_set_two_things_of_one_object(make_scene) -> None:

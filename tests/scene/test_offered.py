@@ -205,8 +205,8 @@ def scene_of(folder, group, plugin, parameter, name) -> list[VariableScene]:
     made = []
     for inside in insides:
         (folder / "scene.xml").write_text(
-            '<scene version="3.0.0"><integrator type="path"/><sensor type="perspective"/>'
-            f'<shape type="sphere" id="other"/>{element(group, plugin, inside)}</scene>'
+            f'<scene version="3.0.0">{element(group, plugin, inside)}<integrator type="path"/>'
+            '<sensor type="perspective"/><shape type="sphere" id="other"/></scene>'
         )
         try:
             made.append(VariableScene(read_scene(folder)))

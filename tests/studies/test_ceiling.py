@@ -91,18 +91,6 @@ def test_what_makes_no_study_is_refused_before_anything_is_rendered(
     assert not folder.exists()
 
 
-def test_rows_with_and_without_lpips_are_compared_by_what_both_have() -> None:
-    values = {"mape": 2.0, "dssim": 4.0, "mae": 8.0}
-    rows = [values | {"lpips": 64.0, "error": 8.0}, values | {"error": 4.0}]
-    table = pd.DataFrame(
-        [{f"{name}_{key}": row[key] for name in ("hard", "uniform") for key in row} for row in rows]
-    )
-    assert runs.comparable(table[:1])["hard_error"].tolist() == [8.0]
-    both = runs.comparable(table)
-    assert both["hard_error"].tolist() == pytest.approx([4.0, 4.0])
-    assert both["uniform_error"].tolist() == pytest.approx([4.0, 4.0])
-
-
 def test_with_the_whole_pool_there_is_no_choice() -> None:
     sizes = [{"patches": 8, "steps": 5}, {"patches": 16, "steps": 9}]
     found = list(plan(pool=64, sizes=sizes, choices=["a", "b"], seeds=2))

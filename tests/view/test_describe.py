@@ -12,6 +12,7 @@ from ngi.scene.clearance import camera_problems, meeting_views
 from ngi.scene.variable_scene import VariableScene
 from ngi.view.describe import main
 from tests.render.box import BOX
+from tests.scene.stage import write_ply
 
 ROOM = """<scene version="3.0.0">
 <integrator type="path"><integer name="max_depth" value="3"/></integrator>
@@ -162,6 +163,29 @@ def test_what_is_hidden_or_a_part_of_what_moves_is_in_bounds(room, capsys) -> No
         notes[distance] = [line for line in capsys.readouterr().out.splitlines() if "note:" in line]
     assert notes["-9"] == []
     assert ["'box' reaches" in line for line in notes["-3"]] == [True]
+
+
+def test_what_turns_reaches_no_farther_than_it_does(room, capsys) -> None:
+    """The corners of its box would; and instances need no id."""
+    points = [[x, 0, z] for x, z in ((3.9, 0), (0, 3.9), (-3.9, 0), (0, -3.9))]
+    points += [[0, 1, 0], [0, 2, 0]]
+    turn = "{object: plate, property: rotation, axis: [0,1,0], minimum: 0, maximum: 90}"
+    hide = "{object: ball, property: visibility}"
+    up = "{object: ball, property: translation, minimum: [0,0.5,0], maximum: [0,0.6,0]}"
+    folder = room(FREE, turn, hide, up)
+    write_ply(folder / "plate.ply", points, [(0, 1, 4), (1, 2, 4), (2, 3, 5), (3, 0, 5)])
+    more = """<shape type="ply" id="plate"><string name="filename" value="plate.ply"/></shape>
+        <shape type="shapegroup" id="group"><shape type="sphere"/></shape>
+        <shape type="instance"><transform name="to_world"><translate x="OUT" y="3" z="-3"/>
+        </transform><ref id="group"/></shape></scene>"""
+    text = (folder / "scene.xml").read_text()
+    for out, expected in (("-2", []), ("-6", ["reaches 3 out of bounds"])):
+        (folder / "scene.xml").write_text(text.replace("</scene>", more.replace("OUT", out)))
+        main([str(folder), "backend=scalar"])
+        notes = [line for line in capsys.readouterr().out.splitlines() if "note:" in line]
+        assert [part in note for part, note in zip(expected, notes, strict=True)] == [True] * len(
+            expected
+        )
 
 
 @pytest.mark.parametrize("given", ["scene.xml", "."])

@@ -21,7 +21,7 @@ from ngi.machine.memory import keep_freed_memory
 from ngi.reuse import CompactPatches
 from ngi.studies import provenance
 from ngi.studies.ceiling.pool import check_count, chosen, render_pool
-from ngi.studies.ceiling.runs import CHUNK, Run, comparable, do, measured, plan
+from ngi.studies.ceiling.runs import CHUNK, Run, do, measured, plan
 from ngi.studies.ceiling.training import Training
 
 TABLE, TEACHER = "ceiling.csv", "teacher.pt"
@@ -64,9 +64,7 @@ def run_all(config: DictConfig) -> Path:
             )
             table = pd.DataFrame([{"scene": config.scene.name, **row}])
             write_atomically(_file(folder, run), table.to_csv(index=False).encode())
-    table = comparable(
-        pd.concat([pd.read_csv(_file(folder, run)) for run in runs], ignore_index=True)
-    )
+    table = pd.concat([pd.read_csv(_file(folder, run)) for run in runs], ignore_index=True)
     write_atomically(folder / TABLE, table.to_csv(index=False).encode())
     return folder / TABLE
 

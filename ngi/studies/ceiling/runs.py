@@ -6,8 +6,6 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-import numpy as np
-import pandas as pd
 import torch
 from torch import Tensor
 
@@ -117,19 +115,6 @@ def measured(evaluation: Evaluation) -> dict[str, float]:
         known = [result[key] for key in keys[: len(METRICS)] if key in result]
         result[f"{name}_error"] = math.exp(sum(math.log(value) for value in known) / len(known))
     return result
-
-
-def comparable(table: pd.DataFrame) -> pd.DataFrame:
-    """The same rows, `SET_error` being the mean of those metrics that all of them have.
-
-    Some lack LPIPS where its weights came while the study went on.
-    """
-    for name in SETS:
-        keys = [key for metric in METRICS if (key := f"{name}_{metric}") in table]
-        if table[keys].isna().any(axis=None):
-            shared = table[keys].dropna(axis=1)
-            table[f"{name}_error"] = np.exp(np.log(shared).mean(axis=1))
-    return table
 
 
 def _part(whole: int, number: int, parts: int) -> int:
