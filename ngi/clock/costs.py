@@ -78,6 +78,7 @@ def components(settings: Mapping[str, Any], *, renderer: Renderer, scored: bool)
         **{part: settings[part] for part in ("model", "loss", "trainer")},
         "optimizer": _without(settings["optimizer"], "lr", "adam_lr"),
         **_averaging(settings),
+        **_inputs(settings, renderer),
         **patches,
     }
     rendering = {
@@ -103,6 +104,19 @@ def _proposing(sampler: Mapping[str, Any]) -> dict[str, Any]:
     if "proposal" in sampler:
         return {"proposal": sampler["proposal"]["_target_"]}
     return {"sampler": _without(sampler, "chains")}
+
+
+def _inputs(settings: Mapping[str, Any], renderer: Renderer) -> dict[str, int]:
+    """What a network is given beside buffers and v, and what of v it is not given; nothing where
+    there is neither: what is measured already stays what it is called.
+    """
+    found = {}
+    if settings["model"].get("relative") and (points := len(renderer.moving_points.offset)):
+        found["moving_points"] = points
+    camera = renderer.camera_part
+    if settings["data"].get("camera") is False and (left_out := camera.stop - camera.start):
+        found["left_out"] = left_out
+    return found
 
 
 def _averaging(settings: Mapping[str, Any]) -> dict[str, Any]:

@@ -43,12 +43,13 @@ def check(options: MetricsOptions) -> int:
         try:
             result = read_result(file)
             frames = recomputed(file.parent, result, lpips=lpips)
-        except ValueError as error:
-            print(error, file=sys.stderr)
+            shown, found = table(result, frames), list(differences(result, frames))
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            damaged = f"{file} is no result of this program ({type(error).__name__}: {error})"
+            print(error if isinstance(error, ValueError) else damaged, file=sys.stderr)
             status = 2
             continue
-        print(f"\n{file.parent}, {result['linear']} pictures\n{table(result, frames)}")
-        found = list(differences(result, frames))
+        print(f"\n{file.parent}, {result['linear']} pictures\n{shown}")
         print("\n".join(found) or "all frames agree")
         status = max(status, int(bool(found)))
     if lpips.reason:

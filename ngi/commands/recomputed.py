@@ -3,6 +3,7 @@
 import json
 import math
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -52,13 +53,17 @@ def recomputed(run: Path, result: Mapping[str, Any], *, lpips: Lpips) -> Frames:
 
 def _protocol(run: Path, result: Mapping[str, Any]) -> EvaluationProtocol:
     settings = result["config"]["evaluation"]["evaluator"]["protocol"]
-    protocol = EvaluationProtocol(**{k: v for k, v in settings.items() if not k.startswith("_")})
-    if protocol.identity != result["protocol"]["identity"]:
-        raise ValueError(
-            f"{run} was measured by protocol {result['protocol']['identity']}, which this program "
-            f"knows as {protocol.identity}; use the version that made it ({result.get('commit')})"
+    told, known = result["protocol"]["identity"], "no protocol"
+    with suppress(TypeError):  # it has others keys
+        protocol = EvaluationProtocol(
+            **{key: value for key, value in settings.items() if not key.startswith("_")}
         )
-    return protocol
+        if (known := protocol.identity) == told:
+            return protocol
+    raise ValueError(
+        f"{run} was measured by protocol {told}, which this program knows as {known}; use the "
+        f"version that made it ({result.get('commit')})"
+    )
 
 
 def differences(result: Mapping[str, Any], frames: Frames) -> Iterator[str]:

@@ -34,10 +34,13 @@ def full_disk_named(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
+        advice = "Make room on the disk (or see to its permissions)"
+        if isinstance(error, FileNotFoundError):  # what was written is gone already
+            advice = "Another process may write it, too: let one of them go on alone"
         raise OSError(
             error.errno,
             f"{error.strerror}: this file could not be written, earlier checkpoints are intact. "
-            "Make room on the disk (or see to its permissions), then start the same command again",
+            f"{advice}, then start the same command again",
             str(path),
         ) from error
 

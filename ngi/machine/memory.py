@@ -89,7 +89,8 @@ def usage(folder: Path) -> dict[str, float | None]:
 
 def _folder_bytes(folder: Path) -> int:
     total = 0
-    for path in folder.rglob("*"):
-        with suppress(OSError):  # renamed meanwhile, as W&B's files are
-            total += path.stat().st_size if path.is_file() else 0
+    for parent, _, names in os.walk(folder):  # which passes over folders that are gone meanwhile
+        for name in names:
+            with suppress(OSError):  # renamed meanwhile, as W&B's files are
+                total += Path(parent, name).stat().st_size
     return total

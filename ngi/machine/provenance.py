@@ -13,6 +13,9 @@ from ngi.machine.size import usable_cores
 
 SCHEMA_VERSION = 1
 
+DATA = "_data"
+"""Folder of a wheel's package that has what lies beside the package in a checkout."""
+
 LIBRARIES = ("torch", "lightning", "mitsuba", "drjit", "hydra-core", "lpips", "numpy")
 
 
@@ -70,12 +73,13 @@ def code_hash() -> str:
     """16 hexadecimal digits over every module of this package, with its name.
 
     It differs between two states of the code with the same commit, if a module of the package has
-    changed. Files beside the package, and classes that a configuration takes from other packages,
-    do not count.
+    changed. Files beside the package, which a wheel has in `DATA`, and classes that a configuration
+    takes from other packages, do not count.
     """
     folder = Path(ngi.__file__).resolve().parent
     digest = hashlib.sha256()
-    for file in sorted(folder.rglob("*.py")):
+    modules = (f for f in folder.rglob("*.py") if f.relative_to(folder).parts[0] != DATA)
+    for file in sorted(modules):
         digest.update(f"{file.relative_to(folder)}\0{file.stat().st_size}\0".encode())
         digest.update(file.read_bytes())
     return digest.hexdigest()[:16]

@@ -73,7 +73,8 @@ class Prioritised(DrawingRule):
 
     Patch i is drawn with probability P(i) = p_i^alpha / sum_j p_j^alpha, p_i = loss_i + epsilon,
     with replacement, and its loss counts w_i = (1 / m · 1 / P(i))^beta times, divided by the
-    largest w of the batch: with beta = 1 the mean over batches is that of uniform draws.
+    largest w of the batch. With beta = 1 that undoes P within a batch; batches count by their
+    largest w, so that the mean over batches comes near to that of uniform draws, but is not it.
 
     alpha: 0 draws uniformly; the paper's proportional variant has 0.6
     beta: 0 corrects nothing. The paper goes from 0.4 to 1 in the course of the training; here it

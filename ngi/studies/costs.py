@@ -102,6 +102,8 @@ def _step_seconds(
         halves=renderer.halves,
         layout=renderer.layout,
     )
+    # The network's inputs, which are the scene's; the closed formulas care for neither.
+    stand_in.moving_points, stand_in.camera_part = renderer.moving_points, renderer.camera_part
     config = config.copy()
     with open_dict(config):
         here = "ngi.studies.step_costs"

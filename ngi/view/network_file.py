@@ -204,7 +204,7 @@ def known_light(layout: BufferLayout) -> str:
 
 def _precision(trained: str, differs: float) -> str:
     text = f"float32; trained as {trained}"
-    if trained == FLOAT32:
+    if not differs:
         return text
     return (
         f"{text}, in which the program itself shows the network: its pictures differ from what "

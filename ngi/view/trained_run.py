@@ -14,7 +14,7 @@ from ngi.files.durable import DamagedError
 from ngi.files.run_folder import LAST, PREVIOUS
 from ngi.learn import Samples, network_of, read_checkpoint
 from ngi.machine.captured import Captured, Function
-from ngi.machine.precision import dtype_of
+from ngi.machine.precision import shown_in
 from ngi.view.run_settings import OpenedRun, made_by, make_samples, opened, plain, settings_of
 
 RECORDS = "ngi.learn.graph_trainer.GraphTrainer"
@@ -77,7 +77,8 @@ class TrainedRun(OpenedRun):
 
     def predict(self, buffers: Tensor, scene_vector: Tensor) -> Tensor:
         """Buffers [H, W, C] and v [D] in [0, 1] to log1p of linear RGB [H, W, 3], on the CPU."""
-        device, dtype = next(self.network.parameters()).device, dtype_of(self.precision)
+        device = next(self.network.parameters()).device
+        dtype = shown_in(self.precision, device.type)
         inputs = self.samples.test_inputs(scene_vector, resolution=len(buffers))
         on_device = (tensor.to(device) for tensor in (buffers, *inputs))
         with torch.autocast(device.type, torch.bfloat16, enabled=dtype == torch.bfloat16):

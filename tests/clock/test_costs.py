@@ -14,6 +14,7 @@ from ngi.clock.counters import Counters
 from ngi.clock.phase_clock import PAUSES, PHASES
 from ngi.config.build import run_components
 from ngi.learn import Component, CostFile, ModelClock
+from ngi.patches import MovingPoints
 from ngi.render import AnalyticRenderer
 from tests.learn.composition import run_config
 
@@ -108,6 +109,29 @@ def test_halves_have_costs_of_their_own_and_without_them_all_is_called_as_before
     whole, halves = keys(even), keys(even, "+renderer.halves=true")
     assert keys(even, "+renderer.halves=false") == whole
     assert not {*whole.values()} & {*halves.values()}
+
+
+def test_what_a_network_is_given_of_the_scene_has_a_price() -> None:
+    """Points that move, and what of v only places the camera, where its method makes use of it."""
+    plain, still = keys("method=ours"), keys("method=active_exploration")
+
+    def components(method: str, points: int, camera: slice) -> dict[str, str]:
+        config = run_config(f"method={method}")
+        renderer = AnalyticRenderer(dimensions=3, patch_size=config.renderer.patch_size)
+        renderer.samples_per_pixel = config.renderer.get("samples_per_pixel", 1)
+        renderer.moving_points = MovingPoints(
+            torch.zeros(points, 3, 3), torch.zeros(points, 3), torch.ones(3)
+        )
+        renderer.camera_part = camera
+        return {part.name: part.key for part in run_components(config, renderer=renderer)}
+
+    nothing = slice(0, 0)
+    assert components("ours", 0, nothing) == plain
+    found = [components("ours", 1, nothing), components("ours", 2, nothing)]
+    found.append(components("ours", 0, slice(1, 2)))
+    assert len({each["training"] for each in [plain, *found]}) == 4
+    assert all(each["rendering"] == plain["rendering"] for each in found)
+    assert components("active_exploration", 2, slice(1, 2)) == still
 
 
 def test_how_fast_and_how_far_back_is_no_question_of_cost() -> None:

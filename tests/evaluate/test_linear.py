@@ -133,6 +133,10 @@ def change(run: Path, edit) -> None:
     file.write_text(json.dumps(content))
 
 
+def protocol_of_old(content: dict) -> None:
+    content["config"]["evaluation"]["evaluator"]["protocol"]["forgotten"] = 3
+
+
 def test_the_metrics_are_those_of_the_pictures(run: Path, evaluation: Evaluation, capsys) -> None:
     assert main([f"run={run.parent}"]) == 0
     shown = capsys.readouterr().out
@@ -182,6 +186,9 @@ def test_a_changed_number_is_found(run: Path, capsys) -> None:
         ("size", "hard_02_prediction.exr and its reference are of 8 x 8 and 33 x 33 pixels"),
         ("protocol", "which this program knows as"),
         ("damaged", "result.json is damaged (JSONDecodeError: Expecting value"),
+        ("older", "which this program knows as no protocol; use the version that made it"),
+        ("list", "result.json is no result of this program (AttributeError"),
+        ("other", "result.json is no result of this program (KeyError"),
         ("folder", "holds no finished run"),
     ],
 )
@@ -197,6 +204,10 @@ def test_what_cannot_be_checked_is_said(run: Path, problem: str, message: str, c
         (run / "result.json").write_text("")
     elif problem == "protocol":
         change(run, lambda content: content["protocol"].update(identity="0123"))
+    elif problem == "older":
+        change(run, protocol_of_old)
+    elif problem in ("list", "other"):
+        (run / "result.json").write_text({"list": "[]", "other": '{"linear": "float"}'}[problem])
     else:
         (run / "result.json").unlink()
     assert main([f"run={run}"]) == 2

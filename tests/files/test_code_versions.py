@@ -82,6 +82,8 @@ def test_the_hash_is_over_the_programs_modules_and_nothing_else(tmp_path: Path, 
     monkeypatch.setattr(ngi, "__file__", str(copy / "__init__.py"))
     before = code_hash()
     (copy / "notes.txt").write_text("no module")
+    (copy / "_data" / "scenes").mkdir(parents=True)
+    (copy / "_data" / "scenes" / "make.py").write_text("a script beside the package, in a wheel")
     assert code_hash() == before
     loss = copy / "models" / "loss.py"
     loss.write_text(loss.read_text().replace("1", "2", 1))

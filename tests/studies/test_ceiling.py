@@ -91,6 +91,12 @@ def test_what_makes_no_study_is_refused_before_anything_is_rendered(
     assert not folder.exists()
 
 
+def test_a_store_that_does_not_hold_the_pool_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"a store of 40 patches does not hold the pool of 64"):
+        campaign.run_all(configuration(tmp_path / "a", "reuse.store.capacity=40"))
+    assert not (tmp_path / "a").exists()
+
+
 def test_with_the_whole_pool_there_is_no_choice() -> None:
     sizes = [{"patches": 8, "steps": 5}, {"patches": 16, "steps": 9}]
     found = list(plan(pool=64, sizes=sizes, choices=["a", "b"], seeds=2))

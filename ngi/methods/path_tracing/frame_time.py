@@ -47,11 +47,12 @@ class FrameTimes:
 def largest_fitting(fits: Callable[[int], bool]) -> int:
     """The largest number from 1 up that fits, where every smaller one does; 1 where none does.
 
-    It is doubled until it fits no more, or exceeds `MOST_SAMPLES`, then found by bisection.
+    At most `MOST_SAMPLES`. It is doubled until it fits no more, then found by bisection.
     """
     low, high = 1, 2
     while high <= MOST_SAMPLES and fits(high):
         low, high = high, 2 * high
+    high = min(high, MOST_SAMPLES + 1)
     while high - low > 1:
         middle = (low + high) // 2
         low, high = (middle, high) if fits(middle) else (low, middle)

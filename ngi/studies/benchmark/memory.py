@@ -20,12 +20,19 @@ from ngi.studies.benchmark.scenes import Scene
 
 LEFT_OUT = 0.1
 """The part of the patches in which memory may still grow: caches fill, films get larger."""
+LEAST_BATCHES = 4
+
 LONG = 10_000
 """Patches over which the growth is compared with the peak."""
 
 
 def memory(scene: Scene, *, samples_per_pixel: int | None, patches: int) -> list[Figure]:
-    """Growth and peak of a process that renders patches in batches of 16 and keeps none."""
+    """Growth and peak of a process that renders patches in batches of 16 and keeps none.
+
+    Raises ValueError for too few of them to tell a growth.
+    """
+    if patches < (least := LEAST_BATCHES * PATCHES):
+        raise ValueError(f"patches={patches}: memory's growth takes at least {least}")
     make = partial(Batches, scene.read, samples_per_pixel=samples_per_pixel)
     with remote(make) as batches:
         used = [

@@ -77,10 +77,16 @@ def _rendered(config: DictConfig, folder: Path) -> tuple[Samples, Evaluator, Com
     sampler, count = instantiate(config.sampler), config.ceiling.pool
     check_count(count, sampler)
     with closing(instantiate(config.renderer)) as renderer:
-        if instantiate(config.reuse.store)(layout=renderer.layout).draws_by_loss:
+        store = instantiate(config.reuse.store)(layout=renderer.layout)
+        if store.draws_by_loss:
             raise ValueError(
                 "reuse: its store draws patches by their losses, which this study does not record; "
                 "give reuse=by_samples"
+            )
+        if store.capacity < count:
+            raise ValueError(
+                f"reuse.store.capacity: a store of {store.capacity} patches does not hold the pool "
+                f"of {count}; give reuse=by_samples, or a smaller ceiling.pool"
             )
         claim(folder, config, scene=renderer.scene_hash, backend=renderer.description)
         samples = build_samples(config, renderer=renderer)

@@ -31,6 +31,13 @@ def test_growth_is_that_after_the_first_tenth() -> None:
 
 
 @pytest.mark.usefixtures("here")
+def test_too_few_patches_to_tell_a_growth_are_refused() -> None:
+    [scene] = shipped(["cornell-box"])
+    with pytest.raises(ValueError, match=f"at least {4 * PATCHES}"):
+        memory.memory(scene, samples_per_pixel=1, patches=3 * PATCHES)
+
+
+@pytest.mark.usefixtures("here")
 @pytest.mark.skipif(llvm_problem() is not None, reason=str(llvm_problem()))
 def test_memory_of_a_process_is_what_linux_counts() -> None:
     [scene] = shipped(["cornell-box"])

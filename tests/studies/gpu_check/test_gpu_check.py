@@ -118,6 +118,26 @@ def test_one_that_goes_on_is_begun_as_often_as_it_is_cut_off(tmp_path: Path) -> 
     assert measure.calls == 6
 
 
+def test_training_for_longer_is_another_item(tmp_path: Path) -> None:
+    def trained(seconds: float) -> list[Item]:
+        every = items(Sizes(), tmp_path, training_seconds=seconds)
+        return [item for item in every if item.stage == "training"]
+
+    record = Record(tmp_path, about=ABOUT)
+    for item in trained(900):
+        record.done(item, Outcome([figure("speed", [2.0], "m/s")]))
+    assert record.to_do(trained(900)) == []
+    assert len(record.to_do(trained(3600))) == len(trained(3600)) > 0
+
+
+def test_figures_of_an_earlier_commit_say_so(tmp_path: Path) -> None:
+    item = Item("stage", "name", Measuring(None))
+    checked(tmp_path, item)
+    record = Record(tmp_path, about={**ABOUT, "commit": "def"})
+    record.write_page([item])
+    assert "- stage/name: measured at commit abc" in record.page.read_text()
+
+
 def test_nothing_is_begun_that_may_not_end_in_time(tmp_path: Path) -> None:
     long, on = Measuring(None), Measuring(None)
     every = Item("a", "", long, seconds=100), Item("b", "", on, seconds=100, goes_on=True)
@@ -148,7 +168,7 @@ def test_at_full_size_it_measures_every_scene_method_and_part(tmp_path: Path) ->
     assert sum(item.stage == "pixels" for item in every) == len(one_per_folder())
     assert all(item.seconds < 600 for item in every)
     for scene, method in product(("living-room", "sphere-caustic"), TRAINED):
-        assert f"training/{scene}, {method}" in keys
+        assert f"training/{scene}, {method}, 600 s" in keys
     assert "benchmark/training" in keys
 
 
