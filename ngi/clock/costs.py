@@ -147,12 +147,12 @@ class CostFile:
     def costs(self, wanted: Iterable[Component]) -> Costs:
         """The costs of these components.
 
-        Raises ValueError, with what to do, where one is missing and where they were measured by
-        processes with different numbers of cores: the time of a step would be no machine's.
+        Raises ValueError, with what to do, where one is missing and where they were measured on
+        different processors or numbers of cores: the time of a step would be no machine's.
         """
         entries = self._entries()
         found: Costs = {}
-        cores = {}
+        machines = {}
         for component in wanted:
             if component.key not in entries:
                 about = component.settings.get("scene", component.settings.get("model", {}))
@@ -161,11 +161,12 @@ class CostFile:
                     f"budget.clock=model counts with; {REMEDY}"
                 )
             found[component.name] = dict(entries[component.key]["seconds"])
-            cores[component.key] = entries[component.key].get("machine", {}).get("cores")
-        if len(set(cores.values())) > 1:
+            machine = entries[component.key].get("machine", {})
+            machines[component.key] = f"{machine.get('cores')} cores of {machine.get('processor')}"
+        if len(set(machines.values())) > 1:
             raise ValueError(
-                f"budget.costs: what a step costs in {self.path} was measured on different numbers "
-                f"of cores: {cores}; give another file, and {REMEDY}"
+                f"budget.costs: what a step costs in {self.path} was measured on different "
+                f"machines: {machines}; give another file, and {REMEDY}"
             )
         return found
 

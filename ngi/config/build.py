@@ -186,6 +186,13 @@ def training_device(config: DictConfig) -> str:
     return "cuda" if on_gpu else "cpu"
 
 
+def without_seed(config: DictConfig) -> dict[str, Any]:
+    """`plain`, the same for all seeds and labels of a run, wherever it lies."""
+    config = config.copy()
+    config.seed = 0  # which a Sobol sequence has, too
+    return {**plain(config), "run": None, "label": None}
+
+
 def plain(config: DictConfig) -> dict[str, Any]:
     """The resolved configuration as plain JSON data."""
     container = OmegaConf.to_container(config, resolve=True, throw_on_missing=True)

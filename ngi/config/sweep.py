@@ -6,7 +6,6 @@ launcher starts have a copy.
 
 import atexit
 import json
-import os
 import shutil
 import sys
 import time
@@ -14,6 +13,7 @@ import traceback
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
+from tempfile import mkdtemp
 from typing import Any, NoReturn
 
 from hydra.core.global_hydra import GlobalHydra
@@ -58,9 +58,9 @@ class Sweep(Callback):
         if self._dry_run:
             _show_and_exit(lambda: _planned(config))
         self._begun = time.time()
-        self._notes = Path(config.hydra.sweep.dir, f".sweep-{os.getpid()}").resolve()
-        shutil.rmtree(self._notes, ignore_errors=True)  # a killed process had the same number
-        self._notes.mkdir(parents=True)
+        folder = Path(config.hydra.sweep.dir).resolve()
+        folder.mkdir(parents=True, exist_ok=True)
+        self._notes = Path(mkdtemp(prefix=".sweep-", dir=folder))
         atexit.register(self._end)
         with suppress(*NOT_COMPOSED):  # Hydra will say what is wrong
             self._runs = _planned(config)
@@ -89,7 +89,7 @@ class Sweep(Callback):
         """Says at the end of the program which runs failed, and why."""
         assert self._notes is not None
         failures = [note for note in self._ended().values() if note["failure"] is not None]
-        shutil.rmtree(self._notes)
+        shutil.rmtree(self._notes, ignore_errors=True)
         if failures:
             lines = [f"  {shown(Path(note['folder']))}: {note['failure']}" for note in failures]
             text = "\n".join([f"{counted(failures)} of this sweep failed:", *lines])

@@ -20,9 +20,10 @@ from tabulate import tabulate
 from tqdm import tqdm
 
 from ngi.clock.counters import Counters
-from ngi.config.build import plain, run_components
+from ngi.config.build import run_components, without_seed
 from ngi.config.configuration import run_settings
 from ngi.config.hydra_program import MESSAGES
+from ngi.config.values import check_values
 from ngi.files.code_versions import code_version, code_versions, same_program
 from ngi.files.row_log import RowLog
 from ngi.files.run_folder import RESULT, SETTINGS, has_something, kept_settings, longer
@@ -68,10 +69,25 @@ def planned_runs(config: DictConfig, loader: ConfigLoader) -> list[Planned]:
     (jobs,) = BasicSweeper.split_arguments(overrides, max_batch_size=None)
     costs: dict[str, float | None] = {}
     with tqdm(jobs, desc="plan", unit="run", leave=False, disable=None) as shown:
-        runs = [planned_run(loader.load_sweep_config(config, job), costs) for job in shown]
+        runs = _apart([planned_run(loader.load_sweep_config(config, job), costs) for job in shown])
     common = set.intersection(*map(set, jobs))
     chosen = [" ".join(word for word in job if word not in common) for job in jobs]
     return [replace(run, choices=words) for run, words in zip(runs, chosen, strict=True)]
+
+
+def _apart(runs: Sequence[Planned]) -> list[Planned]:
+    """The same runs; of those in one folder, which are told apart by nothing in its name, only the
+    first can start.
+    """
+    first: set[Path] = set()
+    found = []
+    for run in runs:
+        if run.folder in first and run.runs:
+            state = "cannot start: an earlier run of this sweep has its folder; see run.folder"
+            run = replace(run, state=state, done=0.0, left=None)
+        first.add(run.folder)
+        found.append(run)
+    return found
 
 
 def planned_run(config: DictConfig, costs: dict[str, float | None]) -> Planned:
@@ -82,6 +98,7 @@ def planned_run(config: DictConfig, costs: dict[str, float | None]) -> Planned:
         del config["hydra"]
     folder = Path(config.run.folder).resolve()
     try:
+        check_values(config)
         budget: Budget = instantiate(config.budget)
         state = _state(config, folder)
         done = _done(folder, budget) if state in ("interrupted", "longer") else 0.0
@@ -140,7 +157,7 @@ def _left(
     """By the seconds of the budget, or by its steps and what they were measured to cost."""
     limits = [] if budget.seconds is None else [budget.seconds]
     if budget.steps is not None:
-        key = json.dumps({**plain(config), "seed": 0, "run": 0, "label": 0, "budget": 0})
+        key = json.dumps({**without_seed(config), "budget": 0})
         if key not in costs:
             costs[key] = _seconds_per_step(config)
         if (seconds := costs[key]) is not None:

@@ -15,7 +15,8 @@ class Importance:
 
     and what exceeds R / m of it goes to the others, in proportion to what each lacks of R / m.
 
-    uniform_share: α, in [0, 1]; 1 is the uniform density. As p_i >= α / m, no weight exceeds 1 / α
+    uniform_share: α, in [0, 1]; 1 is the uniform density. As p_i >= α / m, no weight of single
+        draws exceeds 1 / α
     power: of the values, above 0
     largest_ratio: R, at least 1; no candidate is drawn more than so many times as often as by
         uniform draws. Without it a single one that holds most of the value would get most of 1 - α
@@ -70,7 +71,9 @@ class Importance:
         return bounded + excess * room / room.sum()
 
     def weights(self, probabilities: Tensor) -> Tensor:
-        """1 / (m p_i) where `weighted`, else 1: factors of the losses, [m] float64."""
+        """1 / (m p_i) where `weighted`, else 1: factors of the losses of draws with replacement,
+        [m] float64.
+        """
         if not self.weighted:
             return torch.ones_like(probabilities)
         return 1 / (len(probabilities) * probabilities)
@@ -78,13 +81,21 @@ class Importance:
     def draw(self, values: Tensor, count: int, generator: torch.Generator) -> tuple[Tensor, Tensor]:
         """`count` different candidates, [count] int64, and their weights, [count] float64.
 
-        Raises ValueError for more than there are. Where fewer than `count` have any value, the
-        rest is drawn from the others.
+        Where `weighted`, the weighted mean over them has the mean over all candidates as its
+        expectation: n / (m π_i) of n draws, where π_i is the probability that i comes before the
+        first that was not drawn (Cohen and Kaplan 2007, rank conditioning). Raises ValueError for
+        more than there are. Where fewer than `count` have any value, the rest is drawn from the
+        others.
         """
         if count > len(values):
             raise ValueError(f"count: {count} of {len(values)} candidates: there are not so many")
         probabilities = self.probabilities(values)
         # The largest of p_i / Exponential(1) are drawn without replacement (Efraimidis 2006).
         clocks = torch.empty_like(probabilities).exponential_(generator=generator)
-        chosen = (probabilities.clamp(min=1e-300).log() - clocks.log()).topk(count).indices
-        return chosen, self.weights(probabilities)[chosen]
+        speeds = probabilities.clamp(min=1e-300).log() - clocks.log()
+        chosen = speeds.topk(count).indices
+        if not self.weighted or count == len(values):
+            return chosen, torch.ones(count, dtype=torch.float64)
+        end = (-speeds.topk(count + 1).values[-1]).exp()  # when the next one would come
+        included = -torch.expm1(-probabilities[chosen] * end)
+        return chosen, count / (len(values) * included)

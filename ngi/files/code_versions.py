@@ -44,9 +44,9 @@ def record_code_version(folder: Path, *, after_step: int) -> None:
     after_step: the last step that is kept of what was made before
     """
     found, version = code_versions(folder), code_version()
-    if found and same_program(found[-1], version):
+    if found and same_program(found[-1], version) and found[-1]["after_step"] <= after_step:
         return
-    if found and after_step > 0:
+    if found and after_step > 0 and not same_program(found[-1], version):
         log.warning(
             "%s: goes on with %s; up to step %d it was made with %s. If what is computed has "
             "changed in between, run.on_code_change=restart begins it afresh",

@@ -29,4 +29,5 @@ def scene_folders() -> dict[str, Path]:
 
 def cache_folder() -> Path:
     """Where references are kept between runs: $NGI_CACHE, or ~/.cache/ngi."""
-    return Path(os.environ.get("NGI_CACHE", Path.home() / ".cache" / "ngi"))
+    named = os.environ.get("NGI_CACHE")
+    return Path(named) if named else Path.home() / ".cache" / "ngi"

@@ -84,12 +84,16 @@ class RunFolder:
         scene_place: where the scene lies, kept in scene.json; no part of the identity
         """
         if self.lengthened:
-            self._result.unlink(missing_ok=True)  # of the shorter run
+            self.forget_result()
         if self.restarted:
             self._forget()
         _write_json(self._settings, self.settings)
         if scene_place is not None:
             _write_json(self.path / "scene.json", scene_place)
+
+    def forget_result(self) -> None:
+        """Before anything of a finished run is changed that is to be trained longer."""
+        self._result.unlink(missing_ok=True)
 
     def _forget(self) -> None:
         """Deletes what this run would go on with; checkpoints first, on which the rest depends."""

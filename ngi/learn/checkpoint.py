@@ -128,6 +128,7 @@ def _before_decay(folder: RunFolder, newest: dict[str, Any]) -> dict[str, Any]:
             f"{folder.path} can not be trained longer: its learning rate has decayed since step "
             f"{step}, and the checkpoint of that step can not be used ({error}); {remedy}"
         ) from error
+    folder.forget_result()
     folder.previous_checkpoint.unlink(missing_ok=True)  # it may have decayed, too
     write_atomically(folder.checkpoint, path.read_bytes())
     return stable

@@ -1,5 +1,6 @@
 """How large this machine is: its network, its cores, how it begins a run of a given length."""
 
+import math
 import os
 from typing import Any
 
@@ -28,12 +29,12 @@ def usable_cores() -> int:
     return len(os.sched_getaffinity(0))
 
 
-def bootstrap_batches(seconds: float | None) -> int:
+def bootstrap_batches(seconds: Any) -> int:
     """How many batches are rendered before the first is reused: a share of the budget.
 
-    seconds: of the budget; None for a budget in steps
+    seconds: of the budget; None for a budget in steps, and anything else is what is refused later
     """
-    if seconds is None:
+    if not isinstance(seconds, int | float) or not math.isfinite(seconds):
         return MOST_BATCHES
     return max(1, min(MOST_BATCHES, int(seconds / SECONDS_PER_BATCH)))
 

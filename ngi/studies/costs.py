@@ -17,7 +17,7 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf, open_dict
 from tabulate import tabulate
 
-from ngi.config.build import build_module, build_samples, build_stream, plain, run_components
+from ngi.config.build import build_module, build_samples, build_stream, run_components, without_seed
 from ngi.config.configuration import register
 from ngi.config.hydra_program import MESSAGES, completed, fail, run_program, with_overrides
 from ngi.config.values import check_values
@@ -50,7 +50,7 @@ def measure(config: DictConfig) -> None:
     check_values(config)
     from ngi import learn
 
-    settings = {**plain(config), "seed": None, "run": None, "label": None}
+    settings = without_seed(config)
     if (name := json.dumps(settings, sort_keys=True)) in _looked_at:
         return
     _looked_at.add(name)

@@ -206,14 +206,20 @@ def test_a_missing_component_is_named_with_the_remedy(tmp_path: Path) -> None:
         file.costs([component(), rendering])
 
 
-def test_costs_measured_on_different_numbers_of_cores_are_not_added_up(tmp_path: Path) -> None:
+@pytest.mark.parametrize("other", [{"cores": 1}, {"processor": "loom"}])
+def test_costs_measured_on_different_machines_are_not_added_up(
+    tmp_path: Path, other: dict[str, object]
+) -> None:
     file = CostFile(tmp_path / "costs.json")
     training, rendering, scoring = map(component, ("training", "rendering", "scoring"))
-    for part, cores in ((training, 2), (rendering, 1), (scoring, 2)):
-        file.add(part, {"train": [1.0]}, measured_by={"machine": {"cores": cores}})
+    here = {"cores": 2, "processor": "abacus"}
+    for part, machine in ((training, here), (rendering, {**here, **other}), (scoring, here)):
+        file.add(part, {"train": [1.0]}, measured_by={"machine": machine})
     assert set(file.costs([training, scoring])) == {"training", "scoring"}
-    with pytest.raises(ValueError, match=r"costs\.json.*cores: .*rendering-\w+': 1.*ngi costs"):
-        file.costs([training, rendering])
+    told = f"{other.get('cores', 2)} cores of {other.get('processor', 'abacus')}"
+    pattern = rf"costs\.json.*machines: .*rendering-\w+': '{told}'.*ngi costs"
+    with pytest.raises(ValueError, match=pattern):
+        file.costs([training, rendering, scoring])
 
 
 @pytest.mark.parametrize(

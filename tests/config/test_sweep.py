@@ -2,7 +2,6 @@
 
 import atexit
 import json
-import os
 import re
 import shutil
 from pathlib import Path
@@ -83,19 +82,16 @@ def test_of_what_could_not_be_made_it_says_why_as_the_run_does(tmp_path: Path) -
     assert "budget.steps and budget.seconds are both null" in line
 
 
-def test_notes_that_a_killed_sweep_left_are_not_of_the_next_with_its_process_number(
+def test_two_sweeps_of_one_folder_keep_their_notes_apart(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    left = tmp_path / f".sweep-{os.getpid()}"
-    left.mkdir()
-    (left / "0.json").write_text("{}")
-    planned = []
-    monkeypatch.setattr(program, "_planned", lambda config: planned.append(config) or [])
-    monkeypatch.setattr(atexit, "register", planned.append)
-    config = OmegaConf.create({"hydra": {"sweep": {"dir": str(tmp_path)}}})
-    Sweep(dry_run=False).on_multirun_start(config)
-    assert len(planned) == 2
-    assert [*left.iterdir()] == []
+    """In containers their processes may have the same number; a killed one leaves its notes."""
+    monkeypatch.setattr(program, "_planned", lambda _: [])
+    monkeypatch.setattr(atexit, "register", lambda _: None)
+    config = OmegaConf.create({"hydra": {"sweep": {"dir": str(tmp_path / "new")}}})
+    for _ in range(2):
+        Sweep(dry_run=False).on_multirun_start(config)
+    assert [[*folder.iterdir()] for folder in (tmp_path / "new").iterdir()] == [[], []]
 
 
 def contents(folder: Path) -> dict[Path, bytes]:
@@ -136,6 +132,28 @@ def test_what_cannot_start_is_named_beforehand(finished: tuple[Path, str]) -> No
     assert "cannot start: its folder holds another run; choose one with run.folder=…" in output
     assert "1 finished, 1 cannot start" in output
     assert contents(place) == before
+
+
+def test_a_plan_names_values_and_folders_with_which_runs_cannot_start(tmp_path: Path) -> None:
+    status, output = sweep(tmp_path, "sampler.chains=4,0", options=("-m", "--dry-run"))
+    assert status == 1, output
+    assert len(re.findall("cannot start: .*sampler.chains", output)) == 2
+    assert "2 new" in output
+    folder = f"run.folder={tmp_path / 'one'}"
+    status, output = sweep(tmp_path, folder, options=("-m", "--dry-run"))
+    assert status == 1, output
+    assert "1 new" in output
+    assert "an earlier run of this sweep has its folder" in output
+
+
+def test_a_key_that_only_some_of_a_sweeps_options_have_is_given_with_two_plus_signs(
+    tmp_path: Path,
+) -> None:
+    words = ("method=ours,uniform", "model.octaves=3")
+    status, output = sweep(tmp_path, *words, options=("-m", "--dry-run"))
+    assert status == 1
+    assert "model.octaves: there is no such key; where only some" in output
+    assert "++model.octaves=…" in output
 
 
 def test_seconds_are_known_and_one_run_alone_has_a_dry_run_too(tmp_path: Path) -> None:

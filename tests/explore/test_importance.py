@@ -65,6 +65,30 @@ def test_weights_undo_the_density_and_are_bounded() -> None:
     assert weights.max().item() == pytest.approx(1 / 0.25)  # where the value is 0
 
 
+@pytest.mark.parametrize(("share", "count"), [(0.5, 16), (0.1, 16), (0.1, 64), (0.2, 1)])
+def test_the_weighted_mean_of_draws_is_that_of_all_candidates(share: float, count: int) -> None:
+    """Of the rare ones, which most draws are of, and of the others."""
+    values = torch.ones(512)
+    values[:16] = 100.0
+    importance = Importance(uniform_share=share, weighted=True)
+    generator = torch.Generator().manual_seed(3)
+    rare, common = [], []
+    for _ in range(2000):
+        drawn, weights = importance.draw(values, count, generator)
+        rare.append((weights * (drawn < 16)).sum().item() / count)
+        common.append((weights * (drawn >= 16)).sum().item() / count)
+    for found, expected in ((rare, 16 / 512), (common, 496 / 512)):
+        error = np.std(found, ddof=1) / len(found) ** 0.5
+        assert abs(np.mean(found) - expected) < 4 * error
+        assert error < 0.06
+
+
+def test_where_all_are_drawn_all_count_the_same() -> None:
+    importance = Importance(uniform_share=0.2, weighted=True)
+    _, weights = importance.draw(VALUES, 4, torch.Generator().manual_seed(0))
+    assert weights.tolist() == [1, 1, 1, 1]
+
+
 def test_without_weights_all_count_the_same() -> None:
     _, weights = Importance(uniform_share=0.5).draw(VALUES, 3, torch.Generator().manual_seed(0))
     assert weights.tolist() == [1, 1, 1]

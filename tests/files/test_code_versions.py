@@ -51,6 +51,16 @@ def test_every_version_is_recorded_once_and_a_change_is_warned_of(
     folder.close()
 
 
+def test_what_is_done_again_with_another_version_is_of_that_one(tmp_path: Path, program) -> None:
+    """A run that goes back to before the change."""
+    program("a", "1")
+    record_code_version(tmp_path, after_step=0)
+    program("b", "2")
+    for step in (44, 50, 22):
+        record_code_version(tmp_path, after_step=step)
+    assert versions(tmp_path) == [("a", False, "1", 0), ("b", False, "2", 22)]
+
+
 def test_two_states_of_one_commit_are_told_apart(tmp_path: Path, caplog, program) -> None:
     program("a", "1", dirty=True)
     record_code_version(tmp_path, after_step=0)

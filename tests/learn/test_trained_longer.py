@@ -67,6 +67,24 @@ def test_an_interrupted_run_can_be_lengthened_again_and_again(tmp_path: Path) ->
     assert_same(final_state(ours / "run"), final_state(tmp_path / "at once" / "run"))
 
 
+def test_a_run_that_is_broken_off_before_it_is_longer_is_unfinished(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not finished with half of its logs, and either length goes on from it."""
+    first = train(run(tmp_path / "longer", 40, *WSD))
+    with monkeypatch.context() as patch:
+        patch.setattr(RunFolder, "begin", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            train(run(tmp_path / "longer", 60, *WSD))
+    assert not (tmp_path / "longer" / "run" / "result.json").exists()
+    again = train(run(tmp_path / "longer", 40, *WSD))
+    assert (again["steps"], again["metrics"]) == (40, first["metrics"])
+
+
+def interrupted(*_: object, **__: object) -> None:
+    raise KeyboardInterrupt
+
+
 def stop(config: DictConfig, step: int) -> None:
     """Lets the run break off at this step."""
     from ngi.learn import TrainingStream

@@ -1,5 +1,6 @@
 """Sizes that follow from budget and machine."""
 
+import math
 import os
 
 import pytest
@@ -20,6 +21,11 @@ from ngi.machine.size import (
 )
 def test_the_bootstrap_is_a_share_of_the_budget(seconds: float | None, batches: int) -> None:
     assert bootstrap_batches(seconds) == batches
+
+
+@pytest.mark.parametrize("seconds", ["5m", math.inf, math.nan, [1], True])
+def test_what_is_no_budget_is_for_others_to_refuse(seconds: object) -> None:
+    assert 1 <= bootstrap_batches(seconds) <= 4
 
 
 @pytest.mark.parametrize(
