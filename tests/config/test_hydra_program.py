@@ -99,7 +99,9 @@ def test_jobs_of_a_sweep_write_where_their_folder_is(tmp_path: Path) -> None:
     status, output = run(tmp_path, *words, options=("--multirun",))
     assert status == 1
     at_the_time, in_the_end = output.split("2 runs of this sweep failed:")
+    plan, at_the_time = at_the_time.split("2 runs: 2 cannot start")
     for seed in ("maybe", "never"):
+        assert plan.count(f"seed: '{seed}' is not an integer") == 1
         assert at_the_time.count(f"seed: '{seed}' is not an integer") == 1
         assert in_the_end.count(f"runs/{seed}: seed: '{seed}' is not an integer") == 1
     logs = sorted(str(path.relative_to(tmp_path)) for path in tmp_path.rglob("train.log"))
