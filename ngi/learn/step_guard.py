@@ -125,7 +125,7 @@ class StepGuard:
 
     def load_state_dict(self, state_dict: dict[str, Any]) -> None:
         self._log_norm = state_dict["log_norm"]
-        self._in_a_row = state_dict["in_a_row"]
+        self._in_a_row = state_dict.get("in_a_row", 0)  # which older checkpoints lack
 
     def admits(self, attempt: Attempt) -> bool:
         """Whether the step is one to be taken, with its gradient as it is."""

@@ -3,6 +3,7 @@
 from itertools import product
 
 import pandas as pd
+import pytest
 
 from analysis.ceiling import EVERYWHERE, NO_CHOICE, differences
 from analysis.statistics import Estimate, paired_difference
@@ -124,7 +125,7 @@ def as_shown(difference: Estimate) -> str:
 
 def test_how_near_samplers_come_is_what_the_runs_say() -> None:
     folder = ROOT / "docs/exploration-ceiling"
-    small, scarce, quarter, hour = rows_of(
+    small, scarce, quarter, clean_hour, hour = rows_of(
         "docs/exploration-ceiling/README.md", "How near samplers come"
     )[2:]
     for row, name in ((small, "runs.csv"), (scarce, "scarce_ceiling.csv")):
@@ -147,10 +148,14 @@ def test_how_near_samplers_come_is_what_the_runs_say() -> None:
     ):
         assert cell == as_shown(difference_of(error[base], error[other]))
 
-    runs = pd.read_csv(folder / "quarter_hour.csv").set_index(["scene", "seed"])
-    error = {run: of_it["hard_error"] for run, of_it in runs.groupby(["patches", "choice"])}
-    for cell, run in zip(quarter, ((4096, "uniform"), (1792, "oracle")), strict=False):
-        assert cell == as_shown(difference_of(error[1792, "uniform"], error[run]))
+    for row, name, chosen, pool in (
+        (quarter, "quarter_hour.csv", 1792, 4096),
+        (clean_hour, "hour_ceiling.csv", 7336, 16384),
+    ):
+        runs = pd.read_csv(folder / name).set_index(["scene", "seed"])
+        error = {run: of_it["hard_error"] for run, of_it in runs.groupby(["patches", "choice"])}
+        for cell, run in zip(row, ((pool, "uniform"), (chosen, "oracle")), strict=False):
+            assert cell == as_shown(difference_of(error[chosen, "uniform"], error[run]))
 
     runs = pd.read_csv(folder / "hour.csv").set_index(["method", "scene", "seed"])
     ends = geometric_mean(runs.groupby(level=[0, 1, 2]).last(), "hard")
@@ -274,19 +279,28 @@ def percent(number: float) -> str:
     return "0" if rounded == 0 else f"{rounded:+d}".replace("-", "−")
 
 
-def test_what_could_be_gained_in_a_quarter_of_an_hour_is_what_the_runs_say() -> None:
-    every = pd.read_csv(ROOT / "docs/exploration-ceiling/quarter_hour.csv")
+@pytest.mark.parametrize(
+    ("file", "section", "scenes", "chosen", "pool"),
+    [
+        ("quarter_hour.csv", "A quarter of an hour", ("living-room", "veach-egg"), 1792, 4096),
+        ("hour_ceiling.csv", "The end of an hour", ("veach-egg",), 7336, 16384),
+    ],
+)
+def test_what_could_be_gained_with_clean_patches_is_what_the_runs_say(
+    file: str, section: str, scenes: tuple[str, ...], chosen: int, pool: int
+) -> None:
+    every = pd.read_csv(ROOT / "docs/exploration-ceiling" / file)
     every = every.set_index(["scene", "patches", "choice", "seed"]).sort_index()
-    shown = rows_of("docs/exploration-ceiling/README.md", "A quarter of an hour")[2:8]
     columns = {"error": (1, 4), "tail": (1, 4), "relmse": (0.5, 3)}  # root and decimals
-    cases = product(("living-room", "veach-egg"), columns.items())
+    cases = list(product(scenes, columns.items()))
+    shown = rows_of("docs/exploration-ceiling/README.md", section)[2 : 2 + len(cases)]
     for row, (scene, (column, (power, digits))) in zip(shown, cases, strict=True):
         runs = every.loc[scene]
         errors = runs[[f"{frames}_{column}" for frames in ("hard", "uniform")]] ** power
-        base = errors.loc[1792, "uniform"]
+        base = errors.loc[chosen, "uniform"]
         numbers = [" / ".join(f"{error:.{digits}f}" for error in of_one) for of_one in base.values]
         assert row[1] == "; ".join(numbers)
-        for cell, run in zip(row[2:], ((1792, "oracle"), (4096, "uniform")), strict=True):
+        for cell, run in zip(row[2:], ((chosen, "oracle"), (pool, "uniform")), strict=True):
             changes = 100 * (errors.loc[run] / base).dropna() - 100
             numbers = [" / ".join(f"{each:+.1f}" for each in of_one) for of_one in changes.values]
             assert cell == "; ".join(numbers).replace("-", "−")

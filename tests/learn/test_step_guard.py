@@ -241,6 +241,14 @@ def test_refusals_before_an_interruption_count(tmp_path: Path) -> None:
         resumed.admit(attempt)
 
 
+def test_a_checkpoint_of_before_refusals_were_counted_is_gone_on_from(tmp_path: Path) -> None:
+    stream = make(tmp_path, target=LossTimesStep())
+    before, resumed = (StepGuard(stream=stream, folder=tmp_path) for _ in range(2))
+    older = {key: value for key, value in before.state_dict().items() if key != "in_a_row"}
+    resumed.load_state_dict(older)
+    assert resumed.state_dict() == before.state_dict()
+
+
 @pytest.mark.parametrize(
     ("optimizer", "name"),
     [(ADAM, "exp_avg_sq"), (MuonAdam, "exp_avg"), (MuonAdam, "momentum_buffer")],
