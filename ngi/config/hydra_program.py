@@ -143,12 +143,12 @@ def _about_key(error: OmegaConfBaseException) -> str:
     above = full_key.removesuffix(key)
     known = list(_keys(OmegaConf.to_container(parent))) if isinstance(parent, DictConfig) else []
     near = get_close_matches(key, known, n=1) or [k for k in known if k.endswith(f".{key}")]
-    swept = f"; where only some of a sweep's options have it: ++{full_key}=…" * _sweeps()
+    swept = f"; where all options of a sweep have it: ++{full_key}=…" * _sweeps()
     if near:
         return f"{full_key}: there is no such key{_question([above + near[0]])}{swept}"
     there = ", ".join(above + k for k in known if "." not in k) or "none"
-    adding = f"; there are {there} (+{full_key}=… adds one)"
-    return f"{full_key}: there is no such key{swept or adding}"
+    adding = swept or f" (+{full_key}=… adds one)"
+    return f"{full_key}: there is no such key; there are {there}{adding}"
 
 
 def _sweeps() -> bool:

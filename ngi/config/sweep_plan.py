@@ -20,7 +20,7 @@ from tabulate import tabulate
 from tqdm import tqdm
 
 from ngi.clock.counters import Counters
-from ngi.config.build import run_components, without_seed
+from ngi.config.build import plain, run_components, without_seed
 from ngi.config.configuration import run_settings
 from ngi.config.hydra_program import MESSAGES
 from ngi.config.values import check_values
@@ -39,6 +39,7 @@ class Planned:
     done: part of its budget that is used up, 0 to 1
     left: seconds of training that are left, about: what comes after the last checkpoint is done
         again; None where nobody knows, and 0 where a run trains nothing
+    settings: what decides the result, but for the budget
     choices: words that not all runs of the sweep have in common; the folder's name may be cut
     """
 
@@ -46,6 +47,7 @@ class Planned:
     state: str
     done: float
     left: float | None
+    settings: str = ""
     choices: str = ""
 
     @property
@@ -76,16 +78,13 @@ def planned_runs(config: DictConfig, loader: ConfigLoader) -> list[Planned]:
 
 
 def _apart(runs: Sequence[Planned]) -> list[Planned]:
-    """The same runs; of those in one folder, which are told apart by nothing in its name, only the
-    first can start.
-    """
-    first: set[Path] = set()
+    """The same runs; of different ones in one folder only the first can start."""
+    first: dict[Path, str] = {}
     found = []
     for run in runs:
-        if run.folder in first and run.runs:
+        if run.runs and first.setdefault(run.folder, run.settings) != run.settings:
             state = "cannot start: an earlier run of this sweep has its folder; see run.folder"
             run = replace(run, state=state, done=0.0, left=None)
-        first.add(run.folder)
         found.append(run)
     return found
 
@@ -109,7 +108,8 @@ def planned_run(config: DictConfig, costs: dict[str, float | None]) -> Planned:
         return Planned(folder, f"cannot start: {str(cause).splitlines()[0]}", 0.0, None)
     if state == "finished":
         done, left = 1.0, 0.0
-    return Planned(folder, state, done, left)
+    settings = {**plain(config), "run": 0, "label": 0, "budget": 0, "tracker": 0}
+    return Planned(folder, state, done, left, settings=json.dumps(settings))
 
 
 def _state(config: DictConfig, folder: Path) -> str:

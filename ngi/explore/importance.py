@@ -40,7 +40,7 @@ class Importance:
         if self.weighted and self.uniform_share == 0:
             raise ValueError(
                 "uniform_share: 0 with weighted: true: the weights would have no bound; give a "
-                "share above 0, the largest weight is its inverse"
+                "share above 0, the largest weight is about its inverse"
             )
 
     def probabilities(self, values: Tensor) -> Tensor:
@@ -83,9 +83,9 @@ class Importance:
 
         Where `weighted`, the weighted mean over them has the mean over all candidates as its
         expectation: n / (m π_i) of n draws, where π_i is the probability that i comes before the
-        first that was not drawn (Cohen and Kaplan 2007, rank conditioning). Raises ValueError for
-        more than there are. Where fewer than `count` have any value, the rest is drawn from the
-        others.
+        first that was not drawn (Cohen and Kaplan 2007, rank conditioning), or to be drawn, where
+        that is known. Raises ValueError for more than there are. Where fewer than `count` have any
+        value, the rest is drawn from the others.
         """
         if count > len(values):
             raise ValueError(f"count: {count} of {len(values)} candidates: there are not so many")
@@ -94,6 +94,8 @@ class Importance:
         clocks = torch.empty_like(probabilities).exponential_(generator=generator)
         speeds = probabilities.clamp(min=1e-300).log() - clocks.log()
         chosen = speeds.topk(count).indices
+        if count == 1 or probabilities.min() == probabilities.max():
+            return chosen, self.weights(probabilities)[chosen]
         if not self.weighted or count == len(values):
             return chosen, torch.ones(count, dtype=torch.float64)
         end = (-speeds.topk(count + 1).values[-1]).exp()  # when the next one would come

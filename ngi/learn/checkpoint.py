@@ -71,6 +71,8 @@ def prepare_resume(folder: RunFolder) -> Path | None:
     checkpoint = _newest_usable(folder)
     if folder.lengthened and checkpoint is not None:
         checkpoint = _before_decay(folder, checkpoint)
+    if folder.lengthened:
+        folder.forget_result()
     step = 0 if checkpoint is None else checkpoint["global_step"]
     dropped = {log_file: log_file.keep_until(step) for log_file in folder.logs}
     if checkpoint is None:
@@ -129,8 +131,8 @@ def _before_decay(folder: RunFolder, newest: dict[str, Any]) -> dict[str, Any]:
             f"{step}, and the checkpoint of that step can not be used ({error}); {remedy}"
         ) from error
     folder.forget_result()
-    folder.previous_checkpoint.unlink(missing_ok=True)  # it may have decayed, too
     write_atomically(folder.checkpoint, path.read_bytes())
+    folder.previous_checkpoint.unlink(missing_ok=True)  # it may have decayed, too
     return stable
 
 

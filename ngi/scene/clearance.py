@@ -159,8 +159,9 @@ def _outline(shape: mi.Shape, instance: mi.Shape | None) -> Points:
 
     The vertices of a mesh in an instance, which may turn, else the corners of the shape's box.
     """
-    if instance is not None and isinstance(shape, mi.Mesh):
-        points = np.array(mi.traverse(shape)["vertex_positions"], np.float64).reshape(-1, 3)
+    parameters = mi.traverse(shape)
+    if instance is not None and "vertex_positions" in parameters:  # a rectangle, a mesh, has none
+        points = np.array(parameters["vertex_positions"], np.float64).reshape(-1, 3)
     else:
         box = shape.bbox()
         points = np.array(list(product(*zip(np.ravel(box.min), np.ravel(box.max), strict=True))))

@@ -173,10 +173,11 @@ class SceneParameters(Parameters):
         """The group that each instance shows, and the instance, in the order of the file."""
         by_id = {node.id(): node for node in self.objects(mi.Shape)}
         instances = [s for s in self.objects(mi.Shape) if s.class_name().startswith("Instance")]
-        references = self.document.root.iterfind(".//shape[@type='instance']/ref")
+        elements = self.document.root.iterfind(".//shape[@type='instance']")
         return [
             (by_id[ref.get("id", "")], instance)
-            for ref, instance in zip(references, instances, strict=True)
+            for element, instance in zip(elements, instances, strict=True)
+            if (ref := element.find("ref")) is not None
         ]
 
     def _references(self) -> dict[str, str]:

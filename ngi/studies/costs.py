@@ -103,7 +103,9 @@ def _step_seconds(
         layout=renderer.layout,
     )
     # The network's inputs, which are the scene's; the closed formulas care for neither.
-    stand_in.moving_points, stand_in.camera_part = renderer.moving_points, renderer.camera_part
+    stand_in.moving_points = renderer.moving_points
+    if config.data.get("camera") is False:
+        stand_in.camera_part = renderer.camera_part
     config = config.copy()
     with open_dict(config):
         here = "ngi.studies.step_costs"

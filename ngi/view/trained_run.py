@@ -31,7 +31,8 @@ class TrainedRun(OpenedRun):
     Its weights are the averaged ones where the run has such, as in its evaluations.
 
     step: training steps it has had
-    precision: as Lightning names that of training, which is that of `predict` too
+    precision: as Lightning names that of training, which is that of `predict` too where the
+        machine has units for it
     samples: what the network was trained on, which says what it is given
     image: its `render`, as a tuple, recorded as CUDA graphs where the run's steps were
     """

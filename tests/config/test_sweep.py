@@ -146,14 +146,16 @@ def test_a_plan_names_values_and_folders_with_which_runs_cannot_start(tmp_path: 
     assert "an earlier run of this sweep has its folder" in output
 
 
-def test_a_key_that_only_some_of_a_sweeps_options_have_is_given_with_two_plus_signs(
+def test_a_key_that_all_options_of_a_sweep_have_is_given_with_two_plus_signs(
     tmp_path: Path,
 ) -> None:
-    words = ("method=ours,uniform", "model.octaves=3")
-    status, output = sweep(tmp_path, *words, options=("-m", "--dry-run"))
+    words = ("method=ours,ours_uniform", "renderer=mitsuba", "scene=mirror", "data=patches")
+    status, output = sweep(tmp_path, *words, "model.octaves=3", options=("-m", "--dry-run"))
     assert status == 1
-    assert "model.octaves: there is no such key; where only some" in output
+    assert "model.octaves: there is no such key; there are " in output
     assert "++model.octaves=…" in output
+    status, output = sweep(tmp_path, *words, "++model.octaves=3", options=("-m", "--dry-run"))
+    assert "no such key" not in output
 
 
 def test_seconds_are_known_and_one_run_alone_has_a_dry_run_too(tmp_path: Path) -> None:

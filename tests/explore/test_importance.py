@@ -83,6 +83,12 @@ def test_the_weighted_mean_of_draws_is_that_of_all_candidates(share: float, coun
         assert error < 0.06
 
 
+def test_uniform_draws_all_count_the_same() -> None:
+    importance = Importance(uniform_share=0.2, weighted=True)
+    _, weights = importance.draw(torch.ones(50), 8, torch.Generator().manual_seed(0))
+    assert weights.tolist() == pytest.approx([1] * 8)
+
+
 def test_where_all_are_drawn_all_count_the_same() -> None:
     importance = Importance(uniform_share=0.2, weighted=True)
     _, weights = importance.draw(VALUES, 4, torch.Generator().manual_seed(0))

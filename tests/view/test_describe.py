@@ -175,7 +175,7 @@ def test_what_turns_reaches_no_farther_than_it_does(room, capsys) -> None:
     folder = room(FREE, turn, hide, up)
     write_ply(folder / "plate.ply", points, [(0, 1, 4), (1, 2, 4), (2, 3, 5), (3, 0, 5)])
     more = """<shape type="ply" id="plate"><string name="filename" value="plate.ply"/></shape>
-        <shape type="shapegroup" id="group"><shape type="sphere"/></shape>
+        <shape type="shapegroup" id="group"><shape type="rectangle"/></shape>
         <shape type="instance"><transform name="to_world"><translate x="OUT" y="3" z="-3"/>
         </transform><ref id="group"/></shape></scene>"""
     text = (folder / "scene.xml").read_text()

@@ -91,8 +91,9 @@ def _items(sizes: Sizes, folder: Path, training_seconds: float) -> Iterator[Item
         changed = (option.format(seconds=training_seconds) for option in sizes.training_overrides)
         chosen = (f"scene={name}", f"method={method}", *changed)
         overrides = (*chosen, f"run.references={folder / 'references'}")
-        train = partial(training, folder / "training" / name / method, overrides)
-        yield Item("training", f"{name}, {method}, {training_seconds:g} s", train, goes_on=True)
+        length = f"{training_seconds:g} s"
+        train = partial(training, folder / "training" / name / method / length, overrides)
+        yield Item("training", f"{name}, {method}, {length}", train, goes_on=True)
     for scene in shipped(sizes.training):
         yield _whole("frames", scene.name, partial(_frames, scene, sizes), MOST_SECONDS)
 

@@ -89,7 +89,7 @@ def page(items: Sequence[Item], entries: dict[str, Entry], *, about: dict[str, A
         entry = entries.get(item.key, {})
         figures += [Figure(**figure) for figure in entry.get("figures", ())]
         notes += [f"- {item.key}: {note}" for note in entry.get("notes", ())]
-        if entry.get("commit", about["commit"]) != about["commit"]:
+        if "figures" in entry and entry["commit"] != about["commit"]:
             notes.append(f"- {item.key}: measured at commit {entry['commit']}")
         if "figures" not in entry:
             missing.append(f"- {item.key}: {_why(entry)}")
