@@ -8,12 +8,11 @@ from collections.abc import Hashable, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from analysis.command import errors_in_a_line
 from analysis.runs import METRICS, SETS
-from analysis.statistics import Estimate, paired_difference
+from analysis.statistics import Estimate, mean_of_shared, paired_difference
 from analysis.tables import MISSING, Cell, Table, format_percent, to_markdown
 
 RUN = ["scene", "patches", "steps", "choice", "seed"]
@@ -58,14 +57,11 @@ def read_runs(folder: Path) -> pd.DataFrame:
 
 
 def _comparable(runs: pd.DataFrame) -> pd.DataFrame:
-    """The same runs, all of them by three metrics where some lack LPIPS, whose weights came late.
-
-    A run that diverged, which lacks all metrics, is compared by none.
-    """
+    """The same runs; where some lack metrics, `SET_error` is that of those which all have."""
     for frames in SETS:
-        lpips, others = f"{frames}_lpips", [f"{frames}_{name}" for name in METRICS[:-1]]
-        if lpips in runs and (runs[lpips].isna() & runs[others].notna().all(axis=1)).any():
-            runs[f"{frames}_error"] = np.exp(runs[others].apply(np.log).mean(axis=1, skipna=False))
+        metrics = runs.filter(items=[f"{frames}_{name}" for name in METRICS])
+        if metrics.isna().any(axis=None):
+            runs[f"{frames}_error"] = mean_of_shared(metrics)
     return runs
 
 

@@ -9,12 +9,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from analysis.readme_table import markdown_row
 from analysis.runs import METRICS, Run
-from analysis.statistics import Estimate, paired_difference
+from analysis.statistics import Estimate, mean_of_shared, paired_difference
 from analysis.tables import format_percent
 
 ABLATIONS = {  # of a whole method: prefix of its runs, caption
@@ -69,10 +68,7 @@ def errors_by_part(results: pd.DataFrame, whole: str) -> pd.DataFrame:
     it, are left out
     """
     prefix, _ = ABLATIONS[whole]
-    metrics = results[[f"hard_{metric}" for metric in METRICS]]
-    lacking = metrics.isna() & metrics.notna().any(axis=1).to_numpy()[:, None]
-    metrics = metrics.loc[:, ~lacking.any()]  # without weights of LPIPS, which then nobody has
-    error = np.exp(np.log(metrics).mean(axis=1))
+    error = mean_of_shared(results[[f"hard_{metric}" for metric in METRICS]])
     methods = results["method"].replace(OTHER_NAMES)
     parts = methods.str.removeprefix(f"{prefix}/").mask(methods == whole, "")
     named = methods.eq(whole) | methods.str.startswith(f"{prefix}/")

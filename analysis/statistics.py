@@ -5,10 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy  # scipy.stats takes as long to import as pandas, and waits for its first use
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 LEVEL = 0.95
 
@@ -49,6 +52,15 @@ def paired_difference(baseline: Mapping[Any, float], other: Mapping[Any, float])
     if not seeds:
         return None
     return estimate([_relative_difference(baseline[seed], other[seed]) for seed in seeds])
+
+
+def mean_of_shared(metrics: pd.DataFrame) -> pd.Series:
+    """[rows] geometric mean of those columns that all rows have which have any: without weights
+    some lack LPIPS, which then nobody counts with. NaN where a row has none, as one that diverged.
+    """
+    lacking = metrics.isna() & metrics.notna().any(axis=1).to_numpy()[:, None]
+    mean: pd.Series = np.exp(np.log(metrics.loc[:, ~lacking.any()]).mean(axis=1))
+    return mean
 
 
 def _relative_difference(baseline: float, other: float) -> float:

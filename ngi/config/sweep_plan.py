@@ -20,7 +20,7 @@ from tabulate import tabulate
 from tqdm import tqdm
 
 from ngi.clock.counters import Counters
-from ngi.config.build import plain, run_components, without_seed
+from ngi.config.build import run_components, without_seed
 from ngi.config.configuration import run_settings
 from ngi.config.hydra_program import MESSAGES
 from ngi.config.values import check_values
@@ -108,7 +108,7 @@ def planned_run(config: DictConfig, costs: dict[str, float | None]) -> Planned:
         return Planned(folder, f"cannot start: {str(cause).splitlines()[0]}", 0.0, None)
     if state == "finished":
         done, left = 1.0, 0.0
-    settings = {**plain(config), "run": 0, "label": 0, "budget": 0, "tracker": 0}
+    settings = {**run_settings(config, scene_hash="", costs=None), "budget": None}
     return Planned(folder, state, done, left, settings=json.dumps(settings))
 
 

@@ -94,10 +94,10 @@ class Importance:
         clocks = torch.empty_like(probabilities).exponential_(generator=generator)
         speeds = probabilities.clamp(min=1e-300).log() - clocks.log()
         chosen = speeds.topk(count).indices
-        if count == 1 or probabilities.min() == probabilities.max():
+        if not self.weighted or count == 1 or probabilities.min() == probabilities.max():
             return chosen, self.weights(probabilities)[chosen]
-        if not self.weighted or count == len(values):
-            return chosen, torch.ones(count, dtype=torch.float64)
+        if count == len(values):
+            return chosen, torch.ones_like(probabilities)
         end = (-speeds.topk(count + 1).values[-1]).exp()  # when the next one would come
         included = -torch.expm1(-probabilities[chosen] * end)
         return chosen, count / (len(values) * included)

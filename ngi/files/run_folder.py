@@ -83,8 +83,6 @@ class RunFolder:
 
         scene_place: where the scene lies, kept in scene.json; no part of the identity
         """
-        if self.lengthened:
-            self.forget_result()
         if self.restarted:
             self._forget()
         _write_json(self._settings, self.settings)

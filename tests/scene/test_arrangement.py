@@ -177,7 +177,12 @@ def test_an_id_with_a_quotation_mark_may_move(make_scene) -> None:
 
     entry = {"object": "cur'tain", "property": "translation", "minimum": [0, 0, 0]}
     folder = make_scene("stage", [{**entry, "maximum": [1, 0, 0]}], dimensions=1, edit=edit)
-    VariableScene(read_scene(folder)).apply([0.5])
+    scene = VariableScene(read_scene(folder))
+    scene.apply([0.5])
+    instances = [instance for _, instance in scene.placed() if instance is not None]
+    (instance,) = [instance for instance in instances if instance.id() == "cur'tain"]
+    place = np.array(mi.traverse(instance)["to_world"].matrix).reshape(4, 4)[:3, 3]
+    np.testing.assert_allclose(place, [0.6, 1, -0.5], atol=1e-6)
 
 
 def test_small_scenes_keep_their_shapes_and_large_ones_do_not(tmp_path) -> None:

@@ -249,7 +249,9 @@ def test_materials_of_two_nameless_shapes_may_vary(make_scene) -> None:
 
     entries = [material("wedge_group", "paint", "blue"), material("cube_group", "blue", "paint")]
     scene = VariableScene(read_scene(make_scene("stage", entries, dimensions=2, edit=edit)))
-    scene.apply([0, 1])
+    for v, names in (([0, 1], ["paint", "paint"]), ([1, 0], ["blue", "blue"])):
+        scene.apply(v)
+        assert [shape.bsdf().id() for shape, instance in scene.placed() if instance] == names
 
 
 def test_a_group_and_what_is_in_it_are_moved_as_one(make_scene) -> None:
@@ -276,11 +278,18 @@ def test_a_group_and_what_is_in_it_are_moved_as_one(make_scene) -> None:
 
 
 def test_two_cameras_may_be_led_together(load) -> None:
-    load({"object": ["camera", "other"], **LOOK}, edit=second_camera)
+    scene = load({"object": ["camera", "other"], **LOOK}, edit=second_camera)
+    scene.apply(np.ones(6))
+    for sensor in scene.scene.sensors():
+        place = np.array(mi.traverse(sensor)["to_world"].matrix).reshape(4, 4)[:3, 3]
+        np.testing.assert_allclose(place, [1, 2, 5], atol=1e-6)
 
 
 def test_a_scene_without_a_camera_loads(load) -> None:
-    load({"object": "paint", **ALBEDO}, edit=lambda root: root.remove(find(root, "camera")))
+    scene = load({"object": "paint", **ALBEDO}, edit=lambda root: root.remove(find(root, "camera")))
+    scene.apply([1, 0.5, 0])
+    reflectance = mi.traverse(scene.scene)["paint.reflectance.value"]
+    np.testing.assert_allclose(np.ravel(reflectance), [1, 0.5, 0], atol=1e-6)
 
 
 def test_two_variables_may_set_two_things_of_one_object(make_scene) -> None:
