@@ -12,7 +12,7 @@ import pandas as pd
 
 from analysis.command import errors_in_a_line
 from analysis.runs import METRICS, SETS
-from analysis.statistics import Estimate, mean_of_shared, paired_difference
+from analysis.statistics import Estimate, mean_of_shared, paired_difference, shared_metrics
 from analysis.tables import MISSING, Cell, Table, format_percent, to_markdown
 
 RUN = ["scene", "patches", "steps", "choice", "seed"]
@@ -63,6 +63,14 @@ def _comparable(runs: pd.DataFrame) -> pd.DataFrame:
         if metrics.isna().any(axis=None):
             runs[f"{frames}_error"] = mean_of_shared(metrics)
     return runs
+
+
+def metrics_counted(runs: pd.DataFrame) -> str:
+    """Of which metrics `SET_error` is the mean, a sentence."""
+    found = shared_metrics(runs.filter(items=[f"hard_{name}" for name in METRICS]))
+    names = [str(name).removeprefix("hard_").upper() for name in found]
+    lacking = "" if len(names) == len(METRICS) else "; not all runs have the others"
+    return f"The error is the geometric mean of {', '.join(names)}{lacking}."
 
 
 def differences(runs: pd.DataFrame) -> pd.DataFrame:
@@ -166,8 +174,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     found = differences(runs)
     runs.to_csv(output / "runs.csv", index=False, float_format="%.6g")
     found.to_csv(output / "differences.csv", index=False, float_format="%.4g")
-    tables = [*(table(found, error) for error in found["error"].unique()), concentration(runs)]
-    text = "\n\n".join(map(to_markdown, tables)) + "\n"
+    errors = () if found.empty else found["error"].unique()  # of uniform choice alone
+    tables = [*(table(found, error) for error in errors), concentration(runs)]
+    text = "\n\n".join([metrics_counted(runs), *map(to_markdown, tables)]) + "\n"
     (output / "tables.md").write_text(text)
     print(text)
     return 0

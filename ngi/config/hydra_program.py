@@ -118,6 +118,9 @@ def in_plain_words(error: Exception) -> str:
     if not (isinstance(error, InstantiationException) and isinstance(cause, TOLD)):
         return str(error)
     key = str(error).rpartition("full_key: ")[2]
+    if found := re.search(r"__init__\(\) got an unexpected keyword argument '(\w+)'", str(cause)):
+        unknown = f"{key}.{found[1]}"
+        return f"{unknown}: this {key} has no such setting; leave it out: ~{unknown}"
     return str(cause) if key in str(cause) else f"{key}: {cause}"
 
 

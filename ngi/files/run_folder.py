@@ -20,6 +20,8 @@ LAST, PREVIOUS = "last.ckpt", "previous.ckpt"
 STABLE = "stable.ckpt"
 """The last checkpoint before the learning rate decayed."""
 CHECKPOINTS = (LAST, PREVIOUS, STABLE)
+LIMITS = ("steps", "seconds")
+"""Of a budget."""
 TRACKED = "tracker.json"
 """By which trackers know the run: see `ngi.learn.remote_tracker.kept_id`."""
 
@@ -30,7 +32,8 @@ class RunFolder:
     How long it trains is no part of it: a run can be trained longer, in its folder.
 
     settings: everything that decides the result (resolved configuration, scene hash, version),
-        as plain JSON data.
+        as plain JSON data; those of a run that the folder holds stay as they were first written,
+        1 where the command says 1.0 now, for checkpoints go by them.
     linear_megabytes: see `Evaluation.write`
     lengthened: whether the folder holds the same run with a smaller budget
     restarted: whether `begin` will delete what the folder holds of this run
@@ -45,8 +48,6 @@ class RunFolder:
         self.path = path
         self.settings = settings
         self.linear_megabytes = linear_megabytes
-        canonical = json.dumps(_without_limits(settings)[0], sort_keys=True)
-        self.identity = hashlib.sha256(canonical.encode()).hexdigest()[:16]
         self.checkpoint = path / LAST
         self.previous_checkpoint = path / PREVIOUS
         self.stable_checkpoint = path / STABLE
@@ -62,6 +63,12 @@ class RunFolder:
         self.restarted = False
         self._lock = self._acquire_lock()
         self._check_identity()
+
+    @property
+    def identity(self) -> str:
+        """16 hexadecimal digits, by which checkpoints know the run."""
+        canonical = json.dumps(_without_limits(self.settings)[0], sort_keys=True)
+        return hashlib.sha256(canonical.encode()).hexdigest()[:16]
 
     @property
     def name(self) -> str:
@@ -153,12 +160,13 @@ class RunFolder:
             return
         if isinstance(earlier, dict) and longer(self.settings, than=earlier):
             self.lengthened = True
+            self.settings = _with_limits_of(self.settings, earlier)
             return
-        earlier, now = _flatten(earlier), _flatten(self.settings)
+        there, now = _flatten(earlier), _flatten(self.settings)
         different = [
-            f"{key}: {earlier.get(key, 'absent')!r} there, {now.get(key, 'absent')!r} now"
-            for key in sorted(earlier.keys() | now.keys())
-            if earlier.get(key) != now.get(key)
+            f"{key}: {there.get(key, 'absent')!r} there, {now.get(key, 'absent')!r} now"
+            for key in sorted(there.keys() | now.keys())
+            if there.get(key) != now.get(key)
         ]
         if different:
             self._lock.close()
@@ -167,6 +175,7 @@ class RunFolder:
                 f"{'; …' if len(different) > 3 else ''}); choose another folder with run.folder=…, "
                 "or delete that one"
             )
+        self.settings = earlier
 
 
 def has_something(folder: Path) -> bool:
@@ -197,9 +206,16 @@ def longer(settings: dict[str, Any], *, than: dict[str, Any]) -> bool:
 def _without_limits(settings: dict[str, Any]) -> tuple[dict[str, Any], list[float]]:
     """The settings but for how long the run is, and this: steps and seconds, Inf for no limit."""
     budget = dict(settings.get("budget", {}))
-    limits = [budget.pop(unit, None) for unit in ("steps", "seconds")]
+    limits = [budget.pop(unit, None) for unit in LIMITS]
     rest = {**settings, "budget": budget} if "budget" in settings else settings
     return rest, [math.inf if limit is None else limit for limit in limits]
+
+
+def _with_limits_of(settings: dict[str, Any], kept: dict[str, Any]) -> dict[str, Any]:
+    """The settings that a folder has of the same run, as long as the run is to be now."""
+    budget = settings["budget"]
+    limits = {unit: budget[unit] for unit in LIMITS if unit in budget}
+    return {**kept, "budget": {**kept["budget"], **limits}}
 
 
 def _write_json(path: Path, content: dict[str, Any]) -> None:

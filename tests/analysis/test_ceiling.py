@@ -12,6 +12,7 @@ from analysis.ceiling import (
     concentration,
     differences,
     main,
+    metrics_counted,
     read_runs,
 )
 
@@ -40,13 +41,21 @@ def test_runs_with_and_without_lpips_are_compared_by_what_all_have(tmp_path: Pat
         named = {f"{frames}_{key}": row[key] for frames in ("hard", "uniform") for key in row}
         folder = tmp_path / "runs"
         folder.mkdir(exist_ok=True)
-        pd.DataFrame([run | named]).to_csv(folder / f"{seed}.csv", index=False)
+        pd.DataFrame([run | named | {"worst_share": 0.2}]).to_csv(
+            folder / f"{seed}.csv", index=False
+        )
     (tmp_path / "runs/1.csv").rename(tmp_path / "later")
-    assert read_runs(tmp_path)["hard_error"].tolist() == pytest.approx([8, np.nan], nan_ok=True)
+    complete = read_runs(tmp_path)
+    assert complete["hard_error"].tolist() == pytest.approx([8, np.nan], nan_ok=True)
+    mean = "The error is the geometric mean of MAPE, DSSIM, MAE"
+    assert metrics_counted(complete) == f"{mean}, LPIPS."
     (tmp_path / "later").rename(tmp_path / "runs/1.csv")
     for frames in ("hard", "uniform"):
         found = read_runs(tmp_path)[f"{frames}_error"]
         assert found.tolist() == pytest.approx([4, 4, np.nan], nan_ok=True)
+    assert main([str(tmp_path)]) == 0
+    told = (tmp_path / "tables.md").read_text()
+    assert told.startswith(f"{mean}; not all runs have the others.")
 
 
 def study(folder: Path) -> None:

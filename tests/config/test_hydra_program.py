@@ -72,6 +72,10 @@ def test_a_mistyped_key_is_said_in_one_line_and_leaves_nothing(module: str, tmp_
             ("model._target_=nowhere.Network",),
             "model._target_: 'nowhere.Network' cannot be imported: No module named 'nowhere'",
         ),
+        (
+            ("+renderer.direct=traced",),
+            "renderer.direct: this renderer has no such setting; leave it out: ~renderer.direct",
+        ),
     ],
 )
 def test_an_error_of_a_run_is_said_once_and_kept_where_the_run_is(

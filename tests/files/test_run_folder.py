@@ -96,6 +96,21 @@ def test_a_start_that_failed_early_does_not_claim_the_folder(tmp_path: Path) -> 
         RunFolder(tmp_path, settings=SETTINGS)
 
 
+def test_a_number_written_otherwise_is_the_run_that_checkpoints_know(tmp_path: Path) -> None:
+    """`optimizer.lr=1` and `1.0`, which JSON keeps apart and settings do not."""
+    first = RunFolder(tmp_path, settings={**SETTINGS, "lr": 1, "budget": {"steps": 4, "spp": 8}})
+    first.begin()
+    first.checkpoint.write_bytes(b"")
+    first.close()
+    for steps in (4, 8, 16):
+        budget = {"steps": steps, "spp": 8.0}
+        again = RunFolder(tmp_path, settings={**SETTINGS, "lr": 1.0, "budget": budget})
+        again.begin()
+        again.close()
+        assert again.identity == first.identity
+        assert again.settings["budget"]["steps"] == steps
+
+
 def test_damaged_settings_are_named(tmp_path: Path) -> None:
     folder = RunFolder(tmp_path, settings=SETTINGS)
     folder.begin()

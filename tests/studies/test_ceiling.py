@@ -10,8 +10,10 @@ from omegaconf import DictConfig
 
 from ngi.config.configuration import composed
 from ngi.explore import Importance
+from ngi.files.code_versions import code_version
 from ngi.studies.ceiling import campaign, runs
 from ngi.studies.ceiling.runs import Run, plan, true_errors
+from ngi.studies.provenance import claim
 
 PROTOCOL = "evaluation.evaluator.protocol"
 
@@ -72,6 +74,24 @@ def test_who_renders_a_scene_and_where_it_lies_makes_no_other_study(tmp_path: Pa
     assert "scene" not in found["configuration"]["renderer"]
     with pytest.raises(ValueError, match="made with another scene"):
         campaign.claim(tmp_path, here, scene="another hash", backend="a backend")
+
+
+def test_a_study_that_goes_on_with_other_code_says_so_once_and_keeps_both(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def versions() -> list[str]:
+        claim(tmp_path, {"scene": "a hash"}, backend="a backend", option="run.folder")
+        kept = json.loads((tmp_path / "provenance.json").read_text())["commits"]
+        return [entry["code"] for entry in kept]
+
+    now = code_version()["code"]
+    assert versions() == versions() == [now]
+    assert not caplog.records
+    other = {**code_version(), "code": "another"}
+    monkeypatch.setattr("ngi.studies.provenance.code_version", lambda: other)
+    assert versions() == versions() == [now, "another"]
+    (record,) = caplog.records
+    assert "give another run.folder" in record.getMessage()
 
 
 @pytest.mark.parametrize(
