@@ -14,7 +14,7 @@ SCENE ?= living-room
 help: ## list the commands
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 14
 
-setup: $(VENV)/.complete ## virtual environment, pinned dependencies, libLLVM, AlexNet for LPIPS (233 MB; LPIPS=no: without)
+setup: $(VENV)/.complete ## virtual environment, pinned dependencies, libLLVM, AlexNet for LPIPS (244 MB; LPIPS=no: without)
 
 $(VENV)/.complete: pyproject.toml constraints.txt tools/setup.sh
 	@PYTHON=$(PYTHON) VENV=$(VENV) sh tools/setup.sh

@@ -30,8 +30,8 @@ class Effect:
     effect_percent: 100 · (ratio - 1), negative where the method claimed to be better has less
     error, NaN where an error is not finite; low, high: its 95 % interval, None for one seed;
     hedges_g: the mean log ratio in standard deviations between seeds (between scenes, over all
-    scenes), same sign, None for one; seeds: pairs of runs; frames: pairs of frames per seed (0
-    for the worst 5 %, which are other frames in every run).
+    scenes), same sign, None where `analysis.statistics.hedges_g` gives none; seeds: pairs of runs;
+    frames: pairs of frames per seed (0 for the worst 5 %, which are other frames in every run).
     """
 
     effect_percent: float

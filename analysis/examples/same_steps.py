@@ -7,44 +7,62 @@ with uniform sampling, after the same run time and after the same number of step
 
 # %%
 import sys
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from analysis import load_runs
 from analysis.effects import paired_effect
-from analysis.runs import METRICS
+from analysis.pairs import pair_runs, shared_metrics
+from analysis.runs import Run, find_runs
 
-evaluations = load_runs(sys.argv[1] if len(sys.argv) > 1 else "outputs/demo").evaluations
-of_hard_frames = evaluations[evaluations["metric"].isin(METRICS)].query(
-    "statistic == 'mean' and set == 'hard' and step > 0"
-)
-scenes = sys.argv[2:] or sorted(of_hard_frames["scene"].unique())
-
-# %% Mean logarithm of the metrics: a column per method, scene and seed, a row per step
-log_errors = (
-    of_hard_frames[of_hard_frames["scene"].isin(scenes)]
-    .assign(log_error=lambda rows: np.log(rows["value"]))
-    .pivot_table(values="log_error", index="step", columns=["method", "scene", "seed"])
-)
+runs = find_runs(Path(sys.argv[1] if len(sys.argv) > 1 else "outputs/demo"))[0]
+scenes = sys.argv[2:] or sorted({run.scene for run in runs})
+methods = sorted({run.label.get("method", "uniform") for run in runs} - {"uniform"})
 
 
-def differences(run: pd.Series, baseline: pd.Series) -> tuple[float, float, float]:
-    """Part of the baseline's steps, and log error less the baseline's at its end and its step."""
-    run, baseline = run.dropna(), baseline.dropna()
-    steps, error = float(run.index[-1]), float(run.iloc[-1])
-    at_its_step = np.interp(steps, baseline.index.to_numpy(), baseline.to_numpy())
-    return steps / baseline.index[-1], error - baseline.iloc[-1], error - at_its_step
+# %% Steps of a run's evaluations, and the mean logarithm of the metrics there
+def curve(run: Run, metrics: list[str]) -> tuple[np.ndarray, np.ndarray]:
+    keys = [f"hard_{metric}" for metric in metrics]
+    rows = run.history[run.history["step"] > 0].dropna(subset=keys)
+    return rows["step"].to_numpy(float), np.log(rows[keys].to_numpy(float)).mean(axis=1)
 
 
-# %% Differences in per cent, with 95 % intervals over seeds and scenes
+def differences(run: Run, baseline: Run) -> tuple[float, float, float] | None:
+    """Part of the baseline's steps, and log error less the baseline's at its end and its step.
+
+    None for what is not trained, and for a run that was not evaluated.
+    """
+    metrics = shared_metrics([run, baseline], "hard")
+    (steps, errors), (of_baseline, its_errors) = (curve(one, metrics) for one in (run, baseline))
+    if not (steps.size and of_baseline.size):
+        return None
+    at_its_step = np.interp(steps[-1], of_baseline, its_errors)
+    return (
+        float(steps[-1] / of_baseline[-1]),
+        float(errors[-1] - its_errors[-1]),
+        float(errors[-1] - at_its_step),
+    )
+
+
+# %% Differences in per cent, with 95 % intervals over the seeds that all scenes have, and scenes
 print("Error on hard frames against uniform sampling, geometric mean of the metrics:")
-for method in log_errors.columns.get_level_values(0).unique().drop("uniform"):
-    pairs = [(s, k) for s, k in log_errors[method] if (s, k) in log_errors["uniform"]]
-    values = [differences(log_errors[method][p], log_errors["uniform"][p]) for p in pairs]
-    table = pd.DataFrame(values, index=pd.MultiIndex.from_tuples(pairs))
-    print(f"{method}: {len(pairs)} runs, {table[0].mean():.3f} of the steps")
+for method in methods:
+    pairs = [pair for scene in scenes for pair in pair_runs(runs, scene, method, "uniform")]
+    found = {
+        (pair.better.scene, pair.better.seed): values
+        for pair in pairs
+        if (values := differences(pair.better, pair.worse)) is not None
+    }
+    if not found:
+        continue
+    table = pd.DataFrame(list(found.values()), index=pd.MultiIndex.from_tuples(found))
+    print(f"{method}: {len(table)} runs, {table[0].mean():.3f} of the steps")
     for column, what in ((1, "time"), (2, "steps")):
-        effect = paired_effect(table[column].unstack(0).to_numpy())
+        by_seed = table[column].unstack(0).dropna()
+        if by_seed.empty:
+            print(f"  after the same {what}: no seed that all these scenes have")
+            continue
+        effect = paired_effect(by_seed.to_numpy())
         interval = "" if effect.low is None else f" [{effect.low:+.1f}, {effect.high:+.1f}]"
         print(f"  after the same {what}: {effect.effect_percent:+.1f} %{interval}")

@@ -14,13 +14,12 @@ import numpy as np
 from scipy.stats import t
 from tabulate import tabulate
 
-from analysis.runs import METRICS, Run, find_runs
+from analysis.pairs import pair_runs
+from analysis.runs import METRICS, find_runs
 from analysis.speedup import log_error_series, time_to_stay_below
 
 folder, method, baseline = sys.argv[1:4]
-runs: dict[tuple[str, str, int], Run] = {
-    (run.scene, run.label["method"], run.seed): run for run in find_runs(Path(folder))[0]
-}
+runs = find_runs(Path(folder))[0]
 
 
 # %% Means and 95 % intervals over seeds
@@ -34,13 +33,9 @@ def interval(values: list[float]) -> str:
 
 # %% A row per scene
 rows = []
-for scene in sorted({scene for scene, _, _ in runs}):
-    seeds = [s for place, m, s in runs if (place, m) == (scene, method)]
-    both = [
-        (runs[scene, method, s], runs[scene, baseline, s])
-        for s in seeds
-        if (scene, baseline, s) in runs
-    ]
+for scene in sorted({run.scene for run in runs}):
+    pairs = pair_runs(runs, scene, method, baseline)
+    both = [(pair.better, pair.worse) for pair in pairs]
     if not both:
         continue
     parts, differences = [], []

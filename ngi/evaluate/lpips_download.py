@@ -15,7 +15,7 @@ from ngi.evaluate.lpips_metric import cached_weights
 from ngi.machine.torchvision_operators import ensure_torchvision_operators
 
 SHA256 = "7be5be791159472b1fbf3c69796f7cb30dca7ad8466c2df70058c37116cdee02"
-SIZE = "233 MB"
+SIZE = "244 MB"
 PATIENCE = 20.0
 """Seconds without an answer after which there is no network."""
 

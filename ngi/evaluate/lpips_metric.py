@@ -67,7 +67,7 @@ def _how_to_get_weights(path: Path) -> str:
 
 def _convolutions(path: Path) -> dict[str, Tensor]:
     """AlexNet's convolution weights and biases, by their names in torchvision ('0.weight', …)."""
-    try:  # mapped: of the whole state dict's 233 MB ten are used
+    try:  # mapped: of the whole state dict's 244 MB ten are used
         state: Any = torch.load(path, map_location="cpu", weights_only=True, mmap=is_zipfile(path))
     except FileNotFoundError as error:
         raise ValueError(f"LPIPS weights {path}: there is no such file") from error

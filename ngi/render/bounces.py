@@ -19,8 +19,9 @@ Branch = tuple[Any, Any]
 Color3f."""
 
 Bounce = Callable[..., tuple[Branch, Branch]]
-"""(hit: SurfaceInteraction3f, active: Bool) -> the stronger branch, and the other one, which has no
-weight where there is none."""
+"""(hit: SurfaceInteraction3f, active: Bool, photons: bool) -> the stronger branch, and the other
+one, which has no weight where there is none. photons: weights are of the flux that is carried on,
+which refraction does not scale as it scales radiance (Veach 1997, Sec. 5.2)."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,11 @@ def _conductor(bsdf: mi.BSDF) -> Bounce:
     reflectance = colour(children.get("specular_reflectance"))
     index, absorption = colour(children["eta"]), colour(children["k"])
 
-    def bounce(hit: mi.SurfaceInteraction3f, active: mi.Bool) -> tuple[Branch, Branch]:
+    def bounce(
+        hit: mi.SurfaceInteraction3f,
+        active: mi.Bool,
+        photons: bool,  # noqa: ARG001 - a mirror reflects both alike
+    ) -> tuple[Branch, Branch]:
         cosine = dr.abs(mi.Frame3f.cos_theta(hit.wi))
         channels = zip(index(hit, active), absorption(hit, active), strict=True)
         fresnel = [mi.fresnel_conductor(cosine, mi.Complex2f(n, k)) for n, k in channels]
@@ -104,10 +109,13 @@ def _by_strength(
     reflectance = colour(children.get("specular_reflectance"))
     transmittance = colour(children.get("specular_transmittance"))
 
-    def bounce(hit: mi.SurfaceInteraction3f, active: mi.Bool) -> tuple[Branch, Branch]:
+    def bounce(
+        hit: mi.SurfaceInteraction3f, active: mi.Bool, photons: bool
+    ) -> tuple[Branch, Branch]:
         share, through, factor = branches(hit)
         reflected = mi.reflect(hit.wi), share * reflectance(hit, active)
-        passing = through, (1 - share) * factor * transmittance(hit, active)
+        passed = (1 - share) if photons else (1 - share) * factor
+        passing = through, passed * transmittance(hit, active)
         reflects = share > 0.5
         return dr.select(reflects, reflected, passing), dr.select(reflects, passing, reflected)
 

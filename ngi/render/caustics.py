@@ -101,7 +101,7 @@ def caustics_of(scene: VariableScene, chain: SpecularChain) -> Caustics | None:
     if not mirrors or bounces < 1:
         return None
     return Caustics(
-        replace(chain, maximum_bounces=bounces, highlights=False),
+        replace(chain, maximum_bounces=bounces, highlights=False, photons=True),
         mirrors,
         IrradiancePictures(scene.description.bounds),
     )
@@ -122,4 +122,7 @@ def photon_points() -> list[mi.Float]:
 
 
 def _is_diffuse(hit: mi.SurfaceInteraction3f) -> mi.Bool:
-    return hit.is_valid() & mi.has_flag(hit.bsdf().flags(), mi.BSDFFlags.DiffuseReflection)
+    """Whether it scatters light on the side that the hit is on."""
+    flags = hit.bsdf().flags()
+    acts = (mi.Frame3f.cos_theta(hit.wi) > 0) | mi.has_flag(flags, mi.BSDFFlags.BackSide)
+    return hit.is_valid() & acts & mi.has_flag(flags, mi.BSDFFlags.DiffuseReflection)

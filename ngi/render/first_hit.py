@@ -59,7 +59,10 @@ class FirstHit:
         if "direct" in self.layout.names:
             direct = direct_light(scene, hit, light_point)
             if self.caustics is not None:
-                direct += self.caustics.radiance(caustics, hit)
+                added = self.caustics.radiance(caustics, hit)
+                if self.chain is not None:  # one more edge, to the mirror
+                    added = dr.select(self.chain.lit(end.segments + 1), added, 0)
+                direct += added
             if self.chain is not None:
                 direct = dr.select(self.chain.lit(end.segments), end.throughput * direct, 0)
             traced["direct"] = list(direct)

@@ -97,7 +97,9 @@ class Renderer(Protocol):
 
         states: [n, D + 2] in [0, 1]: the scene vector, then the patch position (x, y). The patch's
         first pixel column is floor(x * (resolution - P + 1)), clamped to the last one; rows alike.
-        The same states, resolution and seed give the same numbers bit for bit on the same machine.
+        The same states, resolution and seed give the same numbers bit for bit on the same machine,
+        but where a GPU's memory was too small at one time and not at another: see
+        `ngi.render.fitting`.
         Raises ValueError for states of the wrong length or outside [0, 1], or a patch larger than
         the image.
         """

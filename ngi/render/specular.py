@@ -56,6 +56,7 @@ class SpecularChain:
     buffers: those that the scene carries because of them. Once there are bounces, the position
         does not tell the outgoing direction any more, nor does the camera's view what is seen.
     highlights: whether emitters are looked for in the directions that are not followed.
+    photons: whether it is a photon's flux that is carried on, in place of radiance.
     """
 
     surfaces: list[SpecularSurface]
@@ -63,6 +64,7 @@ class SpecularChain:
     longest_path: int
     buffers: tuple[str, ...]
     highlights: bool
+    photons: bool = False
 
     def follow(self, scene: mi.Scene, ray: mi.Ray3f) -> ChainEnd:
         """A loop in the kernel, or in Python where the variant is scalar.
@@ -129,7 +131,7 @@ class SpecularChain:
                 here = here & (mi.Frame3f.cos_theta(hit.wi) > 0)
             roughness = surface.material.roughness(hit, here)
             here = here & (roughness <= SPECULAR_ROUGHNESS)
-            stronger, weaker = surface.bounce(hit, here)
+            stronger, weaker = surface.bounce(hit, here, self.photons)
             goes_on = goes_on | here
             followed = dr.select(here, stronger, followed)
             other = dr.select(here, weaker, other)

@@ -63,7 +63,7 @@ def test_they_come_where_lpips_looks_for_them(served, monkeypatch, capsys) -> No
     status, lines = told(monkeypatch, capsys, url=served, sha256=sha256)
     assert status == 0
     assert len(lines) == 1
-    assert "233 MB" in lines[0]
+    assert "244 MB" in lines[0]
     assert cached_weights().read_bytes() == CONTENT
     status, (line,) = told(monkeypatch, capsys, url="none is asked", sha256="")
     assert status == 0

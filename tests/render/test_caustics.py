@@ -16,6 +16,7 @@ from tests.render.test_direct_light import (
     ALBEDO,
     BULB,
     BULB_AT,
+    DIFFUSE,
     DIM,
     FLOOR,
     INTENSITY,
@@ -92,6 +93,41 @@ def test_light_goes_through_a_pane(load) -> None:
     image = seen.image_buffers(torch.zeros(1), resolution=RESOLUTION)
     throughput = image[..., seen.layout.slice("throughput")].numpy()
     assert_close(direct(seen), throughput * passes * of_a_bulb(BULB_AT), mean=0.02, rms=0.15)
+
+
+def test_refraction_leaves_a_photons_flux_as_it_is(load, tmp_path) -> None:
+    """Under water, where radiance is greater than above it by the index squared and light is not.
+
+    What leaves the bulb within an angle of the vertical arrives within a circle on the floor.
+    """
+    index, height, depth = 1.5, BULB_AT[2] - 1, 1.0
+    load(FLOOR + BULB + rectangle("water", PANE, GLASS))
+    scene = VariableScene(read_scene(tmp_path))
+    options = {"needed_only": True, "trace_specular": False, "trace_direct": True}
+    caustics = first_hit_of(scene, trace_caustics=True, **options).caustics
+    traced = caustics.trace(scene.scene, photon_points())
+    sines = np.linspace(0.05, 0.75, 200)
+    below = np.sqrt(1 - (sines / index) ** 2)
+    cosines = np.sqrt(1 - sines**2)
+    radii = height * sines / cosines + depth * sines / index / below
+    enters = 1 - fresnel(cosines, index)
+    rings = np.pi * np.diff(radii**2)
+    flux = 2 * np.pi * -np.diff(cosines) * (enters[1:] + enters[:-1]) / 2
+    for radius in (0.3, 0.6, 0.9):
+        expected = ALBEDO / np.pi * INTENSITY * np.interp(radius, radii[1:], flux / rings)
+        x, y = map(float, BULB_AT[:2] + [radius, 0])
+        hit = scene.scene.ray_intersect(mi.Ray3f([x, y, 0.5], [0, 0, -1]))
+        np.testing.assert_allclose(caustics.radiance(traced, hit).numpy()[:, 0], expected, rtol=0.2)
+
+
+def test_the_back_of_a_one_sided_surface_shows_no_light(load) -> None:
+    """As in Mitsuba, where it is black."""
+    turned = FLOOR.replace('<scale value="4"/>', '<scale value="4"/><rotate x="1" angle="180"/>')
+    twosided = f'<bsdf type="twosided" id="both">{DIFFUSE}</bsdf>'
+    wall = rectangle("wall", WALL, MIRROR)
+    assert (direct(load(turned + BULB + wall)) == 0).all()
+    both = direct(load(turned.replace(DIFFUSE, twosided) + BULB + wall))
+    np.testing.assert_allclose(both, direct(load(FLOOR + BULB + wall)), rtol=0.01, atol=1e-4)
 
 
 def test_a_mirror_that_moves_and_grows_is_where_it_is(load, monkeypatch) -> None:
