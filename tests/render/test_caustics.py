@@ -115,7 +115,7 @@ def test_refraction_leaves_a_photons_flux_as_it_is(load, tmp_path) -> None:
     flux = 2 * np.pi * -np.diff(cosines) * (enters[1:] + enters[:-1]) / 2
     for radius in (0.3, 0.6, 0.9):
         expected = ALBEDO / np.pi * INTENSITY * np.interp(radius, radii[1:], flux / rings)
-        x, y = map(float, BULB_AT[:2] + [radius, 0])
+        x, y = float(BULB_AT[0]) + radius, float(BULB_AT[1])
         hit = scene.scene.ray_intersect(mi.Ray3f([x, y, 0.5], [0, 0, -1]))
         np.testing.assert_allclose(caustics.radiance(traced, hit).numpy()[:, 0], expected, rtol=0.2)
 
