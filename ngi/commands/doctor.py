@@ -127,7 +127,12 @@ for name, problem in problems.items():
 def lpips_weights() -> Finding:
     from ngi.evaluate import Lpips
 
-    metric = Lpips(weights=os.environ.get("NGI_LPIPS_WEIGHTS"))
+    configured = os.environ.get("NGI_LPIPS_WEIGHTS")
+    try:
+        metric = Lpips(weights=configured)
+    except (ValueError, OSError) as error:
+        remedy = "correct or unset NGI_LPIPS_WEIGHTS" if configured else "delete it, and make setup"
+        return Finding("LPIPS weights", False, str(error), remedy)
     detail = "found" if metric.available else "none: the LPIPS column stays empty"
     return Finding("LPIPS weights", metric.available, detail, metric.reason or "")
 
@@ -137,12 +142,21 @@ CHECKS: tuple[Callable[[], Finding], ...] = (
 )  # fmt: skip
 
 
+REQUIRED = (python, libraries, renderer)
+"""Checks without whose result the program cannot run."""
+
+
 def examine(check: Callable[[], Finding]) -> Finding:
-    """The check's finding; a check that can not even be made is one too."""
+    """The check's finding; a check that can not even be made, whatever is in its way, is one too.
+
+    Its other findings are what somebody needs whose machine is broken.
+    """
     try:
         return check()
-    except (ImportError, ValueError, OSError) as error:
-        return Finding(check.__name__.replace("_", " "), False, str(error), "make setup", True)
+    except Exception as error:
+        required = check in REQUIRED
+        remedy = "make setup" if required or isinstance(error, ImportError) else ""
+        return Finding(check.__name__.replace("_", " "), False, str(error), remedy, required)
 
 
 def report(findings: Sequence[Finding]) -> str:

@@ -44,7 +44,14 @@ def check(options: MetricsOptions) -> int:
             result = read_result(file)
             frames = recomputed(file.parent, result, lpips=lpips)
             shown, found = table(result, frames), list(differences(result, frames))
-        except (ValueError, KeyError, TypeError, AttributeError) as error:
+        except (
+            ValueError,
+            KeyError,
+            TypeError,
+            AttributeError,
+            OSError,
+            ZeroDivisionError,
+        ) as error:
             damaged = f"{file} is no result of this program ({type(error).__name__}: {error})"
             print(error if isinstance(error, ValueError) else damaged, file=sys.stderr)
             status = 2

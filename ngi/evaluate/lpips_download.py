@@ -38,6 +38,9 @@ def download(url: str, to: Path, *, sha256: str) -> None:
 def main() -> int:
     """Says in a line what came of it; 1 where there are no weights now."""
     if configured := os.environ.get("NGI_LPIPS_WEIGHTS"):
+        if not Path(configured).is_file():
+            print(f"LPIPS: NGI_LPIPS_WEIGHTS={configured}: no such file; correct or unset it")
+            return 1
         print(f"LPIPS: AlexNet's weights are those of NGI_LPIPS_WEIGHTS={configured}")
         return 0
     place = cached_weights()

@@ -59,10 +59,8 @@ class FirstHit:
         if "direct" in self.layout.names:
             direct = direct_light(scene, hit, light_point)
             if self.caustics is not None:
-                added = self.caustics.radiance(caustics, hit)
-                if self.chain is not None:  # one more edge, to the mirror
-                    added = dr.select(self.chain.lit(end.segments + 1), added, 0)
-                direct += added
+                fits = True if self.chain is None else self.chain.lit(end.segments + 1)
+                direct += dr.select(fits, self.caustics.radiance(caustics, hit), 0)
             if self.chain is not None:
                 direct = dr.select(self.chain.lit(end.segments), end.throughput * direct, 0)
             traced["direct"] = list(direct)

@@ -1,5 +1,6 @@
 """What varies, or could vary, in a scene: `ngi describe SCENE`."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,12 +31,14 @@ def describe(options: DescribeOptions) -> int:
 
     activate(options.backend)
     path = Path(options.scene)
+    if path.name == "scene.yaml":
+        path = path.parent
     document = path / "scene.xml" if path.is_dir() else path
     if (arguments := scenes().get(options.scene)) is not None:
         description = read_scene(**arguments)
     elif (path / "scene.yaml").is_file():
         description = read_scene(path)
-    elif document.is_file() and document.suffix == ".xml" and "var_" not in document.read_text():
+    elif document.is_file() and document.suffix == ".xml" and not _of_the_authors(document):
         print(describe_file(document))
         return 0
     elif not path.exists():
@@ -53,6 +56,11 @@ def describe(options: DescribeOptions) -> int:
     for problem in problems:
         print(f"  error: {problem}")
     return 1 if problems else 0
+
+
+def _of_the_authors(document: Path) -> bool:
+    """Whether something in the file varies by its name."""
+    return re.search(r"""\bid\s*=\s*["']var_""", document.read_text()) is not None
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

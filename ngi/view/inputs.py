@@ -126,16 +126,23 @@ class Slider(_One):
 
     def shown(self, v: Sequence[float]) -> float:
         value = self.control.value(v[self.control.component])
-        return min(max(round(value, self._digits), self.control.low), self.control.high)
+        low, high = self._ends
+        return min(max(round(value, self._digits), low), high)
 
     def components(self, value: float) -> dict[int, float]:
         return {self.control.component: self.control.of_value(value)}
 
     def add(self, gui: viser.GuiApi, v: Sequence[float]) -> Any:
-        name, low, high = self.control.name, self.control.low, self.control.high
+        name, (low, high) = self.control.name, self._ends
         step = 10.0**-self._digits
         hint = f"from {low:g} to {high:g}"
         return gui.add_slider(name, low, high, step, self.shown(v), marks=(), hint=hint)
+
+    @property
+    def _ends(self) -> tuple[float, float]:
+        """In order: scenes of the paper's authors may have a range that falls."""
+        low, high = sorted((self.control.low, self.control.high))
+        return low, high
 
     @property
     def _digits(self) -> int:
@@ -143,7 +150,7 @@ class Slider(_One):
 
         Of a component without a range, which scenes of the paper's authors may have, it has one.
         """
-        width = max(self.control.high - self.control.low, NO_WIDTH)
+        width = max(abs(self.control.high - self.control.low), NO_WIDTH)
         return -math.floor(math.log10(width / STEPS))
 
 

@@ -136,7 +136,8 @@ class Page:
             first.up = np.asarray(subject.camera.up)
         self._server.on_client_connect(self._welcome)
         self._server.on_client_disconnect(lambda client: studio.close(client.client_id))
-        self.address = f"http://{host}:{self._server.get_port()}"
+        shown = f"[{host}]" if ":" in host else host or "127.0.0.1"
+        self.address = f"http://{shown}:{self._server.get_port()}"
 
     @property
     def gui(self) -> viser.GuiApi:

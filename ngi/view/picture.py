@@ -6,6 +6,7 @@ import os
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
     from ngi.render import Renderer
 
 SUFFIXES = (".png", ".exr")
+
+SEEDS = 4
+"""That a reference is rendered with at most until all of its pixels are finite."""
 
 
 @dataclass
@@ -65,13 +69,12 @@ def write_picture(options: PictureOptions) -> None:
         v = _scene_vector(options, run.renderer)
         begin = perf_counter()
         radiance = run.radiance(v, resolution=options.resolution)
-        print(f"step {run.step}, {1e3 * (perf_counter() - begin):.0f} ms; {out}")
+        took = perf_counter() - begin
         _write(out, radiance, exposure=options.exposure)
+        print(f"step {run.step}, {1e3 * took:.0f} ms; {out}")
         if options.reference == 0:
             return
-        reference = run.renderer.render_image(
-            v, resolution=options.resolution, samples_per_pixel=options.reference, seed=0
-        ).cpu()
+        reference = _traced(options, run.renderer, v)
     _write(_beside(out, "reference"), reference, exposure=options.exposure)
     error = Image.fromarray(error_picture(radiance, reference, run.protocol.epsilon))
     error.save(_beside(out, "error").with_suffix(".png"))
@@ -87,14 +90,35 @@ def _scene_vector(options: PictureOptions, renderer: Renderer) -> Tensor:
     return given_vector(options.v, dimensions=renderer.dimensions, name="v")
 
 
+def _traced(options: PictureOptions, renderer: Renderer, v: Tensor) -> Tensor:
+    """The reference, [H, W, 3]. Pixels that a path made NaN or Inf are another seed's."""
+    import torch
+
+    def traced(seed: int) -> Tensor:
+        return renderer.render_image(
+            v, resolution=options.resolution, samples_per_pixel=options.reference, seed=seed
+        ).cpu()
+
+    picture = traced(seed=0)
+    for seed in range(1, SEEDS):
+        finite = picture.isfinite().all(dim=-1, keepdim=True)
+        if finite.all():
+            break
+        picture = torch.where(finite, picture, traced(seed))
+    return picture
+
+
 def _write(path: Path, radiance: Tensor, *, exposure: float) -> None:
     from ngi.evaluate.pictures import srgb_picture
+    from ngi.files.durable import write_atomically
     from ngi.render.exr import write_exr
 
     if path.suffix == ".exr":
         write_exr(path, radiance)
     else:
-        srgb_picture(radiance, exposure).save(path)
+        picture = BytesIO()
+        srgb_picture(radiance, exposure).save(picture, "png")
+        write_atomically(path, picture.getvalue())
 
 
 def _beside(path: Path, what: str) -> Path:

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from ngi.files.durable import write_atomically
 from ngi.render.materials import collect_materials
 from ngi.render.needs import buffer_needs, buffers_are_static, direct_need, needed_layout
 from ngi.render.sampling_advice import sampling_advice
@@ -63,7 +64,7 @@ def describe_file(path: Path) -> str:
     if target.exists():
         lines += ["", f"{target} is there: describe its folder {path.parent}"]
     else:
-        target.write_text(starter_yaml(document, scene, found))
+        write_atomically(target, starter_yaml(document, scene, found).encode())
         lines += ["", f"wrote {target}; adjust it, then describe its folder {path.parent}"]
     return "\n".join(lines)
 

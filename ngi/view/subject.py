@@ -43,9 +43,10 @@ class Camera:
         far away it looks: see `nearest_target`.
         """
         low, high = np.array(self.variable.minimum), np.array(self.variable.maximum)
-        start = np.clip(np.asarray(origin, dtype=np.float64), low[:3], high[:3])
+        least, most = np.minimum(low, high), np.maximum(low, high)  # the authors' may fall
+        start = np.clip(np.asarray(origin, dtype=np.float64), least[:3], most[:3])
         direction = np.asarray(target, dtype=np.float64) - np.asarray(origin, dtype=np.float64)
-        end = start + nearest_target(direction, low[3:] - start, high[3:] - start)
+        end = start + nearest_target(direction, least[3:] - start, most[3:] - start)
         varied = low != high
         value = np.concatenate([start, end])[varied]
         components: Vector = np.clip((value - low[varied]) / (high - low)[varied], 0, 1)

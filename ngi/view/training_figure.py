@@ -84,7 +84,7 @@ def _errors(axes: Axes, evaluations: pd.DataFrame) -> None:
 
 
 def _losses(axes: Axes, steps: pd.DataFrame) -> None:
-    axes.set(title="loss and reuse", xlabel="run time in seconds", ylim=(0, None))
+    axes.set(title="loss and reuse", xlabel="run time in seconds")
     every = max(1, len(steps) // 500)
     for key, colour, label in (
         ("loss_new", COLOURS[0], "new samples"),
@@ -94,6 +94,7 @@ def _losses(axes: Axes, steps: pd.DataFrame) -> None:
         if key in steps:
             rows = steps[["run_seconds", key]].iloc[::every].dropna()
             axes.plot(*rows.to_numpy().T, color=colour, label=label, lw=1.2)
+    axes.set_ylim(bottom=0)  # keeps the top as it is by then
     if axes.lines:
         axes.legend(frameon=False, fontsize=8)
 

@@ -55,8 +55,8 @@ def write_video(options: VideoOptions) -> None:
     from ngi.view.mp4 import mp4_file, pyav
 
     pyav()
-    _check(options)
     out = _out(options)
+    _check(options, figures=out.with_suffix(".json"))
     with ExitStack() as stack:
         film = _film(options, stack)
         with mp4_file(out, frames_per_second=options.frames_per_second) as add_frame:
@@ -70,18 +70,33 @@ def write_video(options: VideoOptions) -> None:
 def _out(options: VideoOptions) -> Path:
     if options.out is not None:
         return Path(options.out)
-    return Path(options.run) / f"video_{Path(options.path).stem}.mp4"
+    frame = f"_{options.hard_frame}" if options.path == "static" and options.hard_frame else ""
+    return Path(options.run) / f"video_{Path(options.path).stem}{frame}.mp4"
 
 
-def _check(options: VideoOptions) -> None:
+def _check(options: VideoOptions, *, figures: Path) -> None:
+    """figures: the JSON file that is to be written"""
     if options.out is not None:
         check_output(Path(options.out), ".mp4")
+    if figures.exists() and not _is_of_a_video(figures):
+        raise ValueError(
+            f"out: {figures}, where the figures would be written, is there and no video's; "
+            "choose another name"
+        )
     if not options.resolution >= 1 or not options.frames_per_second >= 1:
         raise ValueError("resolution and frames_per_second have to be at least 1")
     if options.reference < 0 or options.reference % 2:
         raise ValueError(f"reference: {options.reference}; it has to be an even number, or 0")
     if not 2 <= options.seconds * options.frames_per_second < float("inf"):
         raise ValueError(f"seconds: {options.seconds}; a video has two frames at least")
+
+
+def _is_of_a_video(figures: Path) -> bool:
+    try:
+        content = json.loads(figures.read_text())
+    except ValueError:
+        return False
+    return isinstance(content, dict) and "measure" in content
 
 
 def _film(options: VideoOptions, stack: ExitStack) -> Film:
@@ -96,16 +111,20 @@ def _film(options: VideoOptions, stack: ExitStack) -> Film:
             raise ValueError(f"beside: {folder} is there already")
         run = open_run(folder, scene_path=options.scene)
         stack.enter_context(closing(run.renderer))
-        if run.renderer.scene_hash != (runs or [run])[0].renderer.scene_hash:
+        first = (runs or [run])[0]
+        if (run.renderer.scene_hash, run.renderer.dimensions) != (
+            first.renderer.scene_hash,
+            first.renderer.dimensions,
+        ):
             raise ValueError(
                 f"beside: {folder} was trained on another scene ('{run.scene_name}') than "
-                f"{options.run} ('{runs[0].scene_name}'), or on another version of it"
+                f"{options.run} ('{first.scene_name}'), or on another version of it"
             )
         runs.append(run)
     keys = key_frames(options.path, runs[0], still=options.hard_frame)
     return Film(
         runs=runs,
-        labels=_labels([run.folder for run in runs]),
+        labels=_labels(runs),
         path=along(keys, round(options.seconds * options.frames_per_second)),
         resolution=options.resolution,
         samples=options.reference,
@@ -113,11 +132,13 @@ def _film(options: VideoOptions, stack: ExitStack) -> Film:
     )
 
 
-def _labels(folders: Sequence[Path]) -> list[str]:
+def _labels(runs: Sequence[TrainedRun | PathTracedRun]) -> list[str]:
     """What tells the folders' names apart: 'uniform' of outputs/demo/…/method=uniform/seed=0."""
-    if len(folders) == 1:
-        return ["network"]
-    names = [folder.resolve().parts for folder in folders]
+    from ngi.view.path_traced_run import PathTracedRun
+
+    if len(runs) == 1:
+        return ["path tracing" if isinstance(runs[0], PathTracedRun) else "network"]
+    names = [run.folder.resolve().parts for run in runs]
     return [
         "/".join(
             part.removeprefix("method=")

@@ -32,8 +32,23 @@ def test_a_check_that_can_not_be_made_is_a_finding(monkeypatch: pytest.MonkeyPat
     def no_torch() -> Finding:
         raise ModuleNotFoundError("No module named 'torch'")
 
+    def broken_card() -> Finding:
+        raise RuntimeError("CUDA error: all CUDA-capable devices are busy or unavailable")
+
+    monkeypatch.setattr(doctor, "REQUIRED", (no_torch,))
     finding = doctor.examine(no_torch)
-    assert (finding.present, finding.required) == (False, True)
+    assert (finding.present, finding.required, finding.remedy) == (False, True, "make setup")
     assert "torch" in finding.detail
+    finding = doctor.examine(broken_card)
+    assert (finding.present, finding.required) == (False, False)
+    assert "busy" in finding.detail
+
+
+def test_weights_that_are_named_and_not_there_are_nothing_that_set_up_mends(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setenv("NGI_LPIPS_WEIGHTS", "/nowhere.pth")
-    assert "/nowhere.pth" in doctor.examine(doctor.lpips_weights).detail
+    finding = doctor.examine(doctor.lpips_weights)
+    assert "/nowhere.pth" in finding.detail
+    assert finding.remedy == "correct or unset NGI_LPIPS_WEIGHTS"
+    assert not finding.required

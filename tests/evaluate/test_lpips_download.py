@@ -93,11 +93,16 @@ def test_without_a_network_one_line_says_so(monkeypatch, capsys) -> None:
     assert "so its column stays empty" in lines[1]
 
 
-def test_weights_of_ones_own_are_left_alone(monkeypatch, capsys) -> None:
-    monkeypatch.setenv("NGI_LPIPS_WEIGHTS", "/my/weights.pth")
+def test_weights_of_ones_own_are_left_alone(monkeypatch, capsys, tmp_path) -> None:
+    own = tmp_path / "weights.pth"
+    monkeypatch.setenv("NGI_LPIPS_WEIGHTS", str(own))
+    status, (line,) = told(monkeypatch, capsys, url="none is asked", sha256="")
+    assert status == 1
+    assert line.endswith(f"{own}: no such file; correct or unset it")
+    own.write_bytes(b"mine")
     status, (line,) = told(monkeypatch, capsys, url="none is asked", sha256="")
     assert status == 0
-    assert line.endswith("NGI_LPIPS_WEIGHTS=/my/weights.pth")
+    assert line.endswith(f"NGI_LPIPS_WEIGHTS={own}")
 
 
 def test_the_file_is_the_one_that_torchvision_means() -> None:

@@ -109,6 +109,16 @@ def test_nothing_stands_where_a_handle_would_cover_it(gui: viser.GuiApi) -> None
         assert slider.hint.startswith("from ")
 
 
+def test_a_range_that_falls_has_a_slider(gui: viser.GuiApi) -> None:
+    """As scenes of the authors may have: v = 0 stands for the greater value."""
+    slider = Slider(Control("door", "angle", 0, 90.0, -30.0))
+    handle = slider.add(gui, [0.25])
+    assert (handle.min, handle.max, handle.value) == (-30, 90, pytest.approx(60))
+    assert handle.step <= 1
+    assert slider.components(60.0) == {0: pytest.approx(0.25)}
+    assert slider.shown([0.0]) == 90
+
+
 def test_what_has_no_range_has_a_slider(gui: viser.GuiApi) -> None:
     slider = Slider(Control("camera", "x", 0, 0.0, 5e-324))  # as scenes of the authors may say
     assert slider.add(gui, [0.3]).value == pytest.approx(0.0)

@@ -67,6 +67,15 @@ def test_every_part_of_the_figure_shows_its_data() -> None:
     np.testing.assert_array_equal(figure(), usual)
 
 
+def test_losses_are_shown_however_large_they_are() -> None:
+    """Their axis began at 0 and ended at 1."""
+    small, large = (
+        figure(steps=pd.DataFrame({"run_seconds": [1, 2], "loss_new": [top, top / 2]}))
+        for top in (2.0, 40.0)
+    )
+    assert (small != large).any()
+
+
 def test_a_run_that_has_just_begun_has_a_figure_too() -> None:
     empty = torch.empty(0, 4)
     begun = figure(

@@ -12,6 +12,7 @@ import pytest
 import torch
 from PIL import Image
 
+from ngi.render import AnalyticRenderer
 from ngi.render.exr import write_exr
 from ngi.view.picture import main
 from tests.learn.command_line import run, run_module
@@ -61,6 +62,22 @@ def test_a_reference_beside_it_and_the_metrics(trained: Path) -> None:
         np.testing.assert_array_equal(
             np.asarray(Image.open(trained / f"zero_{kind}.png")), expected
         )
+
+
+def test_pixels_that_a_path_made_nan_are_traced_again(
+    trained: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(renderer: AnalyticRenderer, *arguments: object, seed: int, **options: int) -> object:
+        image = usual(renderer, *arguments, seed=seed, **options)
+        image[seed, seed, 0] = torch.nan
+        return image
+
+    usual = AnalyticRenderer.render_image
+    _, expected = render(trained, "reference=4", "resolution=48", "out=whole.png")
+    monkeypatch.setattr(AnalyticRenderer, "render_image", broken)
+    status, output = render(trained, "reference=4", "resolution=48", "out=mended.png")
+    assert status == 0, output
+    assert output.splitlines()[1:] == expected.splitlines()[1:]  # closed formulas have no noise
 
 
 def test_v_may_be_given(trained: Path) -> None:

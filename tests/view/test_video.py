@@ -217,6 +217,8 @@ def test_pixels_that_a_path_made_nan_come_from_the_other_half(
         (("seconds=1",), "seconds: 1.0; a video has two frames at least"),
         (("seconds=nan",), "seconds: nan"),
         (("seconds=inf",), "seconds: inf"),
+        (("out=run/settings.mp4",), "run/settings.json, where the figures would be written, is"),
+        (("path=tour.json", "out=tour.mp4"), "out: tour.json, where the figures would be"),
     ],
 )
 def test_mistakes_are_named(
@@ -235,6 +237,7 @@ def test_mistakes_are_named(
         ("broken", "[[0, 0, 0]"),
     ):
         (trained / f"{name}.txt").write_text(content)
+    (trained / "tour.json").write_text("[[0, 0, 0], [1, 1, 1]]")
     settings = json.loads((trained / "paths" / "settings.json").read_text())
     for name, denoiser in (("started", None), ("hostile", {"_target_": "os.system"})):
         (trained / name).mkdir(exist_ok=True)
@@ -244,6 +247,20 @@ def test_mistakes_are_named(
     assert video(trained, monkeypatch, f"out={tmp_path / 'wrong.mp4'}", *options) == 2
     assert message in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+def test_another_frame_is_another_file_and_path_tracing_is_no_network(
+    trained: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(trained)
+    still = ("run=paths", "path=static", "seconds=2", "frames_per_second=1", f"resolution={SIZE}")
+    for frame in (0, 3, 3):
+        assert main([*still, f"hard_frame={frame}"]) == 0
+    files = sorted(file.name for file in (trained / "paths").glob("video_*.json"))
+    assert files == ["video_static.json", "video_static_3.json"]
+    for file in files:
+        (run,) = json.loads((trained / "paths" / file).read_text())["runs"]
+        assert run["label"] == "path tracing"
 
 
 def test_a_missing_extra_is_named_before_anything_is_done(

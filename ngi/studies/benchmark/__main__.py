@@ -65,6 +65,7 @@ def benchmark(chosen: BenchmarkOptions) -> None:
         others = sorted({*every} - {*SHORT})
         print(f"left out: the scenes {', '.join(others)}; name parts or scenes to measure them")
         every = list(SHORT)
+    Path(chosen.output).parent.mkdir(parents=True, exist_ok=True)
     figures = _measure([parts[name] for name in given] or PARTS, chosen, named, every)
     if chosen.markdown:
         print(markdown(figures))
@@ -90,17 +91,18 @@ def _measure(
                 figures.append(figure)  # one at a time: what was measured before an error stays
             print(f"{table(figures[start:])}\n", flush=True)
     finally:
-        _write(figures, Path(chosen.output))
+        if figures:
+            _write(figures, Path(chosen.output))
     return figures
 
 
 def _write(figures: Sequence[Figure], output: Path) -> None:
+    from ngi.files.durable import write_atomically
     from ngi.machine.backend import activate, describe
     from ngi.machine.provenance import provenance
 
-    output.parent.mkdir(parents=True, exist_ok=True)
     report = {**provenance(backend=describe(activate())), "figures": [asdict(f) for f in figures]}
-    output.write_text(json.dumps(report, indent=2))
+    write_atomically(output, json.dumps(report, indent=2).encode())
     print(f"written to {output}")
 
 

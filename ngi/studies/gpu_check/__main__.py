@@ -84,6 +84,9 @@ def work(items: Sequence[Item], record: Record, *, end: float) -> None:
             record.done(item, item.measure(left))
         except CutOffError:
             record.cut_off(item)
+        except KeyboardInterrupt:  # no crash of the item's
+            record.cut_off(item)
+            raise
         except Exception as error:  # whatever it is, the others are measured
             record.fail(item, error)
         record.write_page(items)

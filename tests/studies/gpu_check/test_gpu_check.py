@@ -93,10 +93,10 @@ def test_an_item_that_fails_leaves_the_others_and_is_tried_again(tmp_path: Path)
 
 
 def test_an_item_that_kills_its_process_is_begun_twice_at_most(tmp_path: Path) -> None:
-    measure = Measuring(*[KeyboardInterrupt()] * 5)
+    measure = Measuring(*[SystemExit()] * 5)  # what nothing is written after
     item = Item("stage", "name", measure)
     for _ in range(2):
-        with pytest.raises(KeyboardInterrupt):
+        with pytest.raises(SystemExit):
             checked(tmp_path, item)
     record = checked(tmp_path, item)
     record.write_page([item])
@@ -107,15 +107,23 @@ def test_an_item_that_kills_its_process_is_begun_twice_at_most(tmp_path: Path) -
 
 
 def test_one_that_goes_on_is_begun_as_often_as_it_is_cut_off(tmp_path: Path) -> None:
-    measure = Measuring(*[CutOffError()] * 3, KeyboardInterrupt(), KeyboardInterrupt(), None)
+    measure = Measuring(*[CutOffError()] * 3, SystemExit(), SystemExit(), None)
     item = Item("stage", "name", measure, goes_on=True)
     for _ in range(3):
         assert checked(tmp_path, item).to_do([item]) == [item]
     for _ in range(2):
-        with pytest.raises(KeyboardInterrupt):
+        with pytest.raises(SystemExit):
             checked(tmp_path, item)
     assert checked(tmp_path, item).to_do([item]) == []
     assert measure.calls == 6
+
+
+def test_ctrl_c_is_no_crash_of_what_was_measured(tmp_path: Path) -> None:
+    item = Item("stage", "name", Measuring(*[KeyboardInterrupt()] * 4, None))
+    for _ in range(4):
+        with pytest.raises(KeyboardInterrupt):
+            checked(tmp_path, item)
+    assert checked(tmp_path, item).to_do([item]) == []
 
 
 def test_training_for_longer_is_another_item(tmp_path: Path) -> None:
