@@ -12,7 +12,7 @@ import pandas as pd
 
 from analysis.command import errors_in_a_line
 from analysis.runs import METRICS, SETS
-from analysis.statistics import Estimate, mean_of_shared, paired_difference, shared_metrics
+from analysis.statistics import Estimate, mean_of_shared, paired_difference, shared_columns
 from analysis.tables import MISSING, Cell, Table, format_percent, to_markdown
 
 RUN = ["scene", "patches", "steps", "choice", "seed"]
@@ -67,7 +67,7 @@ def _comparable(runs: pd.DataFrame) -> pd.DataFrame:
 
 def metrics_counted(runs: pd.DataFrame) -> str:
     """Of which metrics `SET_error` is the mean, a sentence."""
-    found = shared_metrics(runs.filter(items=[f"hard_{name}" for name in METRICS]))
+    found = shared_columns(runs.filter(items=[f"hard_{name}" for name in METRICS]))
     names = [str(name).removeprefix("hard_").upper() for name in found]
     lacking = "" if len(names) == len(METRICS) else "; not all runs have the others"
     return f"The error is the geometric mean of {', '.join(names)}{lacking}."

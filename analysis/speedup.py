@@ -17,8 +17,10 @@ from analysis.statistics import estimate
 Bound = Literal["", "at least", "at most"]
 
 
-def log_error_series(runs: Sequence[Run]) -> list[np.ndarray]:
+def log_error_series(runs: Sequence[Run], *, over: str = "run_seconds") -> list[np.ndarray]:
     """Per run [evaluations, 2]: run seconds, and ln of the geometric mean of the hard metrics.
+
+    over: the column of `Run.history` that counts in place of run seconds, 'step' for one
 
     The metrics are those that every run has; evaluations with an error that is not finite and
     positive are left out.
@@ -32,10 +34,10 @@ def log_error_series(runs: Sequence[Run]) -> list[np.ndarray]:
     for run in runs:
         errors = run.history[keys].to_numpy(dtype=float)
         usable = (np.isfinite(errors) & (errors > 0)).all(axis=1) & bool(keys)
-        seconds = run.history["run_seconds"].to_numpy(dtype=float)[usable]
+        times = run.history[over].to_numpy(dtype=float)[usable]
         values = np.log(errors[usable]).mean(axis=1) if keys else np.empty(0)
-        order = seconds.argsort()
-        series.append(np.stack([seconds[order], values[order]], axis=1))
+        order = times.argsort()
+        series.append(np.stack([times[order], values[order]], axis=1))
     return series
 
 

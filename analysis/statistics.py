@@ -54,15 +54,15 @@ def paired_difference(baseline: Mapping[Any, float], other: Mapping[Any, float])
     return estimate([_relative_difference(baseline[seed], other[seed]) for seed in seeds])
 
 
-def shared_metrics(metrics: pd.DataFrame) -> pd.DataFrame:
+def shared_columns(metrics: pd.DataFrame) -> pd.DataFrame:
     """Those columns that all rows have which have any: without weights some lack LPIPS."""
     lacking = metrics.isna() & metrics.notna().any(axis=1).to_numpy()[:, None]
     return metrics.loc[:, ~lacking.any()]
 
 
 def mean_of_shared(metrics: pd.DataFrame) -> pd.Series:
-    """[rows] geometric mean of `shared_metrics`. NaN where a row has none, as one that diverged."""
-    mean: pd.Series = np.exp(np.log(shared_metrics(metrics)).mean(axis=1))
+    """[rows] geometric mean of `shared_columns`. NaN where a row has none, as one that diverged."""
+    mean: pd.Series = np.exp(np.log(shared_columns(metrics)).mean(axis=1))
     return mean
 
 

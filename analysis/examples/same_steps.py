@@ -13,36 +13,27 @@ import numpy as np
 import pandas as pd
 
 from analysis.effects import paired_effect
-from analysis.pairs import pair_runs, shared_metrics
+from analysis.pairs import pair_runs
 from analysis.runs import Run, find_runs
+from analysis.speedup import log_error_series
 
 runs = find_runs(Path(sys.argv[1] if len(sys.argv) > 1 else "outputs/demo"))[0]
 scenes = sys.argv[2:] or sorted({run.scene for run in runs})
 methods = sorted({run.label.get("method", "uniform") for run in runs} - {"uniform"})
 
 
-# %% Steps of a run's evaluations, and the mean logarithm of the metrics there
-def curve(run: Run, metrics: list[str]) -> tuple[np.ndarray, np.ndarray]:
-    keys = [f"hard_{metric}" for metric in metrics]
-    rows = run.history[run.history["step"] > 0].dropna(subset=keys)
-    return rows["step"].to_numpy(float), np.log(rows[keys].to_numpy(float)).mean(axis=1)
-
-
+# %% Two runs
 def differences(run: Run, baseline: Run) -> tuple[float, float, float] | None:
     """Part of the baseline's steps, and log error less the baseline's at its end and its step.
 
     None for what is not trained, and for a run that was not evaluated.
     """
-    metrics = shared_metrics([run, baseline], "hard")
-    (steps, errors), (of_baseline, its_errors) = (curve(one, metrics) for one in (run, baseline))
-    if not (steps.size and of_baseline.size):
+    series = log_error_series([run, baseline], over="step")
+    own, its = (one[one[:, 0] > 0] for one in series)
+    if not (len(own) and len(its)):
         return None
-    at_its_step = np.interp(steps[-1], of_baseline, its_errors)
-    return (
-        float(steps[-1] / of_baseline[-1]),
-        float(errors[-1] - its_errors[-1]),
-        float(errors[-1] - at_its_step),
-    )
+    (step, error), (its_step, its_error) = own[-1], its[-1]
+    return step / its_step, error - its_error, error - np.interp(step, *its.T)
 
 
 # %% Differences in per cent, with 95 % intervals over the seeds that all scenes have, and scenes

@@ -25,6 +25,10 @@ class MetricsOptions:
     )
 
 
+UNREADABLE = (ValueError, LookupError, TypeError, AttributeError, OSError, ArithmeticError)
+"""What a result.json that is another program's, or none, may raise."""
+
+
 def check(options: MetricsOptions) -> int:
     """Prints what was found; 0 where all agrees, 1 where not, 2 where a run cannot be checked.
 
@@ -44,14 +48,7 @@ def check(options: MetricsOptions) -> int:
             result = read_result(file)
             frames = recomputed(file.parent, result, lpips=lpips)
             shown, found = table(result, frames), list(differences(result, frames))
-        except (
-            ValueError,
-            KeyError,
-            TypeError,
-            AttributeError,
-            OSError,
-            ZeroDivisionError,
-        ) as error:
+        except UNREADABLE as error:
             damaged = f"{file} is no result of this program ({type(error).__name__}: {error})"
             print(error if isinstance(error, ValueError) else damaged, file=sys.stderr)
             status = 2

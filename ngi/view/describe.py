@@ -1,6 +1,5 @@
 """What varies, or could vary, in a scene: `ngi describe SCENE`."""
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -60,7 +59,10 @@ def describe(options: DescribeOptions) -> int:
 
 def _of_the_authors(document: Path) -> bool:
     """Whether something in the file varies by its name."""
-    return re.search(r"""\bid\s*=\s*["']var_""", document.read_text()) is not None
+    from ngi.scene.release.tags import is_variable
+    from ngi.scene.xml_file import read_xml
+
+    return any(map(is_variable, read_xml(document)[0].iter()))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -46,6 +46,11 @@ def viser_server(*, host: str, port: int, label: str | None = None) -> viser.Vis
         return viser.ViserServer(host=host, port=port, label=label, verbose=False)
 
 
+def address(host: str, port: int) -> str:
+    """Of the page, for a browser. host: '' listens everywhere."""
+    return f"http://{f'[{host}]' if ':' in host else host or LOOPBACK[0]}:{port}"
+
+
 def check_address(host: str, port: int) -> None:
     """Raises ValueError where no server can be opened; Viser would wait for ever.
 
@@ -136,8 +141,7 @@ class Page:
             first.up = np.asarray(subject.camera.up)
         self._server.on_client_connect(self._welcome)
         self._server.on_client_disconnect(lambda client: studio.close(client.client_id))
-        shown = f"[{host}]" if ":" in host else host or "127.0.0.1"
-        self.address = f"http://{shown}:{self._server.get_port()}"
+        self.address = address(host, self._server.get_port())
 
     @property
     def gui(self) -> viser.GuiApi:

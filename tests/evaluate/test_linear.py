@@ -189,6 +189,7 @@ def test_a_changed_number_is_found(run: Path, capsys) -> None:
         ("older", "which this program knows as no protocol; use the version that made it"),
         ("list", "result.json is no result of this program (AttributeError"),
         ("other", "result.json is no result of this program (KeyError"),
+        ("unreadable", "result.json is no result of this program (IsADirectoryError"),
         ("folder", "holds no finished run"),
     ],
 )
@@ -210,6 +211,8 @@ def test_what_cannot_be_checked_is_said(run: Path, problem: str, message: str, c
         (run / "result.json").write_text({"list": "[]", "other": '{"linear": "float"}'}[problem])
     else:
         (run / "result.json").unlink()
+        if problem == "unreadable":
+            (run / "result.json").mkdir()
     assert main([f"run={run}"]) == 2
     assert message in capsys.readouterr().err
 

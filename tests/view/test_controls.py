@@ -1,5 +1,7 @@
 """Sliders say what the scene does: compared with the values that it is set to."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -80,6 +82,16 @@ def test_a_view_that_v_can_have_is_kept(name: str) -> None:
         cosine = direction @ direction_again
         cosine /= np.linalg.norm(direction) * np.linalg.norm(direction_again)
         assert cosine > np.cos(np.radians(1e-4))
+
+
+def test_a_camera_whose_range_falls_is_that_whose_range_rises_the_other_way_round() -> None:
+    scene, camera = walked("living-room")
+    low, high = camera.variable.minimum, camera.variable.maximum
+    falling = replace(camera, variable=replace(camera.variable, minimum=high, maximum=low))
+    for v in np.random.default_rng(2).random((20, scene.dimensions)):
+        origin, target = camera.view(v)
+        expected = 1 - camera.components(origin, target)
+        np.testing.assert_allclose(falling.components(origin, target), expected, atol=1e-9)
 
 
 def test_a_view_beyond_the_box_ends_at_its_wall() -> None:

@@ -219,6 +219,24 @@ def test_a_plain_file_becomes_a_variable_scene(room, given, capsys) -> None:
     assert (folder / "scene.yaml").read_text() == before, "an existing scene.yaml was overwritten"
 
 
+def test_a_scene_yaml_is_its_folder(room, capsys) -> None:
+    folder = room(FREE)
+    outputs = []
+    for given in (folder, folder / "scene.yaml"):
+        assert main([str(given), "backend=scalar"]) == 0
+        outputs.append(capsys.readouterr().out)
+    assert outputs[0] == outputs[1]
+
+
+def test_a_name_with_var_in_it_makes_no_file_the_authors(room, capsys) -> None:
+    folder = room(FREE)
+    (folder / "scene.yaml").unlink()
+    document = folder / "scene.xml"
+    document.write_text(document.read_text().replace('id="paint"', 'id="oak_var_2"'))
+    assert main([str(document), "backend=scalar"]) == 0
+    assert "oak_var_2: albedo" in capsys.readouterr().out
+
+
 def test_numbers_of_large_scenes_are_numbers_to_yaml() -> None:
     values = [1e4, -12345.0, 1e-5, 0.0, 1e20, 0.123456]
     written = yaml.safe_load(first_file._list(values))

@@ -1,6 +1,7 @@
 """No page of another origin can drive the viewer."""
 
 from collections.abc import Iterator
+from urllib.parse import urlsplit
 
 import pytest
 
@@ -10,7 +11,7 @@ from websockets.exceptions import InvalidStatus  # noqa: E402
 from websockets.sync.client import connect  # noqa: E402
 from websockets.typing import Origin, Subprotocol  # noqa: E402
 
-from ngi.view.page import is_own_page, viser_server  # noqa: E402
+from ngi.view.page import address, is_own_page, viser_server  # noqa: E402
 
 
 @pytest.fixture(scope="module")
@@ -41,6 +42,14 @@ def test_pages_of_other_origins_are_refused(port: int) -> None:
 def test_its_own_page_and_programs_are_let_in(port: int) -> None:
     assert opened(port, f"http://127.0.0.1:{port}")
     assert opened(port, None)
+
+
+@pytest.mark.parametrize(
+    ("host", "shown"), [("::1", "[::1]"), ("", "127.0.0.1"), ("example.org", "example.org")]
+)
+def test_a_page_is_where_browsers_find_it(host: str, shown: str) -> None:
+    found = urlsplit(address(host, 8080))
+    assert (found.netloc, found.port) == (f"{shown}:8080", 8080)
 
 
 @pytest.mark.parametrize(

@@ -83,6 +83,20 @@ def test_what_was_measured_before_an_error_is_kept(
     ]
 
 
+def test_what_was_measured_before_stays_where_nothing_is_measured(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(_: Options) -> Iterator[Figure]:
+        raise RuntimeError("out of paths")
+        yield
+
+    monkeypatch.setattr(parts, "PARTS", (Part("fail", "", fail),))
+    file = tmp_path / "x.json"
+    file.write_text("figures of yesterday")
+    assert command.main([f"output={file}"]) == 2
+    assert file.read_text() == "figures of yesterday"
+
+
 @pytest.mark.parametrize(
     ("given", "default", "expected"),
     [(None, 16, 16), (None, None, None), (4, 16, 4), ("training", 16, None)],
