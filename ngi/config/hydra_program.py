@@ -73,11 +73,14 @@ NOT_FOR_USERS = ("hydra", "label")
 """Parts of the configuration in which nobody means to change a key."""
 
 
-def run_program(program: Callable[[], None]) -> None:
+def run_program(program: Callable[[], None], *, folder_option: str = "run.folder") -> None:
     """Calls a function that `hydra.main` has made.
 
     Where its configuration cannot be composed or a job of a sweep has failed, the process ends with
-    status 1 and one message. Who sets HYDRA_FULL_ERROR=1 gets the exception with its traceback.
+    status 1 and one message, after Ctrl-C with status 130. Who sets HYDRA_FULL_ERROR=1 gets the
+    exception with its traceback.
+
+    folder_option: what chooses the folder that Hydra writes to
     """
     if os.environ.get(FULL_ERROR) == "1":
         program()
@@ -94,7 +97,10 @@ def run_program(program: Callable[[], None]) -> None:
         cause = error if isinstance(error, OSError) else error.__cause__
         if not isinstance(cause, OSError):
             raise
-        sys.exit(f"{cause}; choose another folder with run.folder=…, or see to its permissions")
+        advice = f"choose another folder with {folder_option}=…, or see to its permissions"
+        sys.exit(f"{cause}; {advice}")
+    except KeyboardInterrupt:
+        sys.exit(130)
 
 
 def fail(error: Exception, *, job: str) -> NoReturn:

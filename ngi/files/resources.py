@@ -3,6 +3,9 @@
 import os
 from pathlib import Path
 
+CACHE_VARIABLE = "NGI_CACHE"
+"""The environment variable that says where `cache_folder` is."""
+
 _PACKAGE = Path(__file__).resolve().parents[1]
 
 
@@ -29,5 +32,5 @@ def scene_folders() -> dict[str, Path]:
 
 def cache_folder() -> Path:
     """Where references are kept between runs: $NGI_CACHE, or ~/.cache/ngi."""
-    named = os.environ.get("NGI_CACHE")
+    named = os.environ.get(CACHE_VARIABLE)
     return Path(named) if named else Path.home() / ".cache" / "ngi"

@@ -21,7 +21,7 @@ from ngi.config.build import build_module, build_samples, build_stream, run_comp
 from ngi.config.configuration import register
 from ngi.config.hydra_program import MESSAGES, completed, fail, run_program, with_overrides
 from ngi.config.values import check_values
-from ngi.files.resources import cache_folder, root
+from ngi.files.resources import CACHE_VARIABLE, cache_folder, root
 from ngi.machine.memory import keep_freed_memory
 from ngi.machine.size import usable_cores
 
@@ -173,7 +173,7 @@ def main() -> None:
     folder = cache_folder() / "costs"
     places = (f"hydra.{mode}.dir={folder}" for mode in ("run", "sweep"))
     sys.argv[1:] = with_overrides(completed(sys.argv[1:]), "hydra/help=costs", *places)
-    run_program(_main)
+    run_program(_main, folder_option=CACHE_VARIABLE)
 
 
 if __name__ == "__main__":

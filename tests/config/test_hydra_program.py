@@ -8,7 +8,7 @@ import pytest
 from hydra.errors import HydraException
 
 from ngi.config.configuration import composed
-from ngi.config.hydra_program import explained
+from ngi.config.hydra_program import explained, run_program
 from tests.learn.command_line import SMALL, run, run_module
 
 
@@ -96,6 +96,23 @@ def test_an_error_of_what_is_measured_is_said_once(tmp_path: Path) -> None:
     status, output = run_module("ngi.studies.costs", *SMALL, "seed=maybe", folder=tmp_path)
     assert status == 1
     assert output.count("seed: 'maybe' is not an integer") == 1
+
+
+def test_costs_name_what_chooses_the_folder_they_write_to(tmp_path: Path) -> None:
+    (tmp_path / "cache").touch()
+    status, output = run_module("ngi.studies.costs", *SMALL, folder=tmp_path)
+    assert status == 1
+    assert f"'{tmp_path / 'cache' / 'costs'}'; choose another folder with NGI_CACHE=…" in output
+
+
+def test_ctrl_c_ends_a_program_without_a_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted() -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setenv("HYDRA_FULL_ERROR", "0")
+    with pytest.raises(SystemExit) as ended:
+        run_program(interrupted)
+    assert ended.value.code == 130
 
 
 def test_jobs_of_a_sweep_write_where_their_folder_is(tmp_path: Path) -> None:

@@ -41,6 +41,7 @@ def check(arguments: Sequence[str] | None = None) -> int:
     chosen = _parser().parse_args(arguments)
     import torch
 
+    from ngi.files.durable import DamagedError
     from ngi.machine.backend import activate, describe
     from ngi.machine.memory import keep_freed_memory
     from ngi.machine.provenance import provenance
@@ -59,9 +60,16 @@ def check(arguments: Sequence[str] | None = None) -> int:
         folder,
         training_seconds=60 * chosen.training_minutes,
     )
-    record = Record(folder, about=about)
+    try:
+        record = Record(folder, about=about)
+    except DamagedError as error:
+        print(error, file=sys.stderr)
+        return 1
     end = time.monotonic() + 60 * chosen.minutes
-    work(every, record, end=end)
+    try:
+        work(every, record, end=end)
+    except KeyboardInterrupt:
+        return 130
     left, failed = record.to_do(every), record.failed(every)
     print(f"{len(every) - len(left)} of {len(every)} measured: {record.page}")
     for key, why in failed.items():

@@ -20,11 +20,29 @@ def surviving(command: Callable[[], Sequence[str]], *, progress: Path) -> int:
     """
     while True:
         before = _contents(progress)
-        status = subprocess.run(command(), check=False).returncode
+        status = _status(command())
         if status >= 0 or -status in ASKED_FOR or _contents(progress) == before:
             return status
         name = signal.Signals(-status).name
         print(f"{name} ended the process; going on in another one", flush=True)
+
+
+def _status(command: Sequence[str]) -> int:
+    """Of a process that no signal leaves behind: it gets SIGTERM, too, as Ctrl-C.
+
+    A terminal's Ctrl-C reaches both; this one waits until the other has noted what it had begun.
+    """
+    process = subprocess.Popen(command)
+    handlers = {
+        signal.SIGTERM: lambda *_: process.send_signal(signal.SIGINT),
+        signal.SIGINT: lambda *_: None,
+    }
+    former = {number: signal.signal(number, handler) for number, handler in handlers.items()}
+    try:
+        return process.wait()
+    finally:
+        for number, handler in former.items():
+            signal.signal(number, handler)
 
 
 def _contents(folder: Path) -> dict[Path, bytes]:

@@ -180,6 +180,31 @@ def test_at_full_size_it_measures_every_scene_method_and_part(tmp_path: Path) ->
     assert "benchmark/training" in keys
 
 
+def test_a_damaged_record_is_named_with_what_to_do(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def begin(every: Sequence[Item], record: Record, **_: object) -> None:
+        record.begin(every[0])
+
+    monkeypatch.setattr("ngi.studies.gpu_check.__main__.work", begin)
+    words = ("--dry-run", "--output", str(tmp_path))
+    check(words)
+    (file,) = tmp_path.rglob("gpu-check.json")
+    file.write_text("{}")
+    assert check(words) == 1
+    assert f"{file} is damaged" in capsys.readouterr().err
+
+
+def test_ctrl_c_ends_the_check_without_a_traceback(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("ngi.studies.gpu_check.__main__.work", interrupted)
+    assert check(["--dry-run", "--output", str(tmp_path)]) == 130
+
+
 def test_without_a_gpu_it_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     if torch.cuda.is_available():
         pytest.skip("there is a GPU")

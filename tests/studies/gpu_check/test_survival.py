@@ -51,20 +51,43 @@ def test_who_ends_the_process_ends_the_command(tmp_path: Path, asked: signal.Sig
     assert ended(tmp_path, asked) == (-asked, 1)
 
 
+@pytest.mark.parametrize("asked", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_to_the_command_leaves_no_process_behind(
+    tmp_path: Path, asked: signal.Signals
+) -> None:
+    """The other process gets SIGTERM as Ctrl-C; Ctrl-C it has from the terminal."""
+    code = """
+import os, signal, sys, time
+from pathlib import Path
+try:
+    Path(sys.argv[1], "begun").touch()
+    os.kill(os.getppid(), int(sys.argv[2]))
+    time.sleep(2 if int(sys.argv[2]) == signal.SIGINT else 60)
+except KeyboardInterrupt:
+    raise SystemExit(130)
+raise SystemExit(5)
+"""
+    command = [sys.executable, "-c", code, str(tmp_path), str(int(asked))]
+    status = surviving(lambda: command, progress=tmp_path)
+    assert status == (130 if asked is signal.SIGTERM else 5)
+    assert (tmp_path / "begun").exists()
+    assert signal.getsignal(asked) in (signal.SIG_DFL, signal.default_int_handler)
+
+
 def test_the_next_process_has_the_time_that_is_left(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     left: list[float] = []
 
-    def crash_twice(words: list[str], **_: object) -> object:
+    def crash_twice(words: list[str]) -> int:
         assert words[3:-1] == ["--minutes", "2", "--output", str(tmp_path)]
         left.append(float(words[-1].removeprefix("--minutes=")))
         (tmp_path / "gpu-check.json").write_text("x" * len(left))
         clock[0] += 30
-        return type("Done", (), {"returncode": -signal.SIGABRT if len(left) < 3 else 3})
+        return -signal.SIGABRT if len(left) < 3 else 3
 
     clock = [100.0]
     monkeypatch.setattr(gpu_check.time, "monotonic", lambda: clock[0])
-    monkeypatch.setattr("ngi.studies.gpu_check.survival.subprocess.run", crash_twice)
+    monkeypatch.setattr("ngi.studies.gpu_check.survival._status", crash_twice)
     assert gpu_check.main(["--minutes", "2", "--output", str(tmp_path)]) == 3
     assert left == pytest.approx([2, 1.5, 1])
