@@ -31,6 +31,8 @@ def recomputed(run: Path, result: Mapping[str, Any], *, lpips: Lpips) -> Frames:
     Raises ValueError where the run has no such pictures, where one cannot be read, and where this
     program measures by another protocol.
     """
+    if "frames" not in result and "metrics" in result:
+        raise ValueError(f"{run} holds the network of a run and none of its pictures")
     if result.get("linear") is None:
         raise ValueError(
             f"{run} has no linear pictures: run.linear_megabytes was too small, or the run is of "

@@ -46,7 +46,7 @@ def pack(options: PackOptions) -> None:
         raise ValueError(f"run: {run} is not finished, there is no {result.name}")
     if out.exists() and any(out.iterdir()):
         raise ValueError(f"out: {out} is not empty")
-    checkpoint = newest_checkpoint(run)
+    checkpoint = newest_checkpoint(run, settings)
     weights = trained_weights(checkpoint["state_dict"])
     content = {
         "global_step": checkpoint["global_step"],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -54,12 +55,7 @@ class TrainedRun(OpenedRun):
         run without a network.
         """
         with settings_of(folder) as settings:
-            if "path_tracing" in settings:
-                raise ValueError(
-                    f"{folder} has no network: path tracing took its place; "
-                    "`ngi video` shows its frames"
-                )
-            checkpoint = newest_checkpoint(folder)
+            checkpoint = newest_checkpoint(folder, settings)
             run = opened(folder, settings, scene_path)
             samples = make_samples(settings, run["renderer"])
             make = partial(made_by(settings, "model"), **plain(settings["model"]))
@@ -107,8 +103,12 @@ def trained_weights(state: dict[str, Tensor]) -> dict[str, Tensor]:
     }
 
 
-def newest_checkpoint(folder: Path) -> dict[str, Any]:
-    """Of the run's two checkpoints the newer one that is whole."""
+def newest_checkpoint(folder: Path, settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Of the run's two checkpoints the newer one that is whole; raises as `TrainedRun.open`."""
+    if "path_tracing" in settings:
+        raise ValueError(
+            f"{folder} has no network: path tracing took its place; `ngi video` shows its frames"
+        )
     problems = []
     for path in (folder / name for name in (LAST, PREVIOUS)):
         if not path.exists():

@@ -182,6 +182,7 @@ def test_a_changed_number_is_found(run: Path, capsys) -> None:
     ("problem", "message"),
     [
         ("none kept", "run has no linear pictures: run.linear_megabytes was too small"),
+        ("packed", "run holds the network of a run and none of its pictures"),
         ("gone", "hard_02_prediction.exr cannot be read"),
         ("size", "hard_02_prediction.exr and its reference are of 8 x 8 and 33 x 33 pixels"),
         ("protocol", "which this program knows as"),
@@ -197,6 +198,8 @@ def test_what_cannot_be_checked_is_said(run: Path, problem: str, message: str, c
     file = run / "linear" / "hard_02_prediction.exr"
     if problem == "none kept":
         change(run, lambda content: content.update(linear=None))
+    elif problem == "packed":
+        change(run, lambda content: [content.pop(key) for key in ("linear", "frames")])
     elif problem == "gone":
         file.unlink()
     elif problem == "size":
