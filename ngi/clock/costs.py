@@ -75,7 +75,8 @@ def components(settings: Mapping[str, Any], *, renderer: Renderer, scored: bool)
         **_gpu(),
     }
     training = {
-        **{part: settings[part] for part in ("model", "loss", "trainer")},
+        "model": _without(settings["model"], "linear_emission"),  # which costs nothing
+        **{part: settings[part] for part in ("loss", "trainer")},
         "optimizer": _without(settings["optimizer"], "lr", "adam_lr"),
         **_averaging(settings),
         **_inputs(settings, renderer),

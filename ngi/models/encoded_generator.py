@@ -26,6 +26,7 @@ class EncodedGenerator(nn.Module):
     octaves, directions: see `PixelEncoding`
     relative: whether it is told where each pixel is relative to what moves
     moving: what moves, as a function of the vector that it is given
+    linear_emission: see `add_known_light`
 
     Under autocast everything between the encoding and the output is in the lower precision.
     """
@@ -41,11 +42,13 @@ class EncodedGenerator(nn.Module):
         directions: bool,
         relative: bool = False,
         moving: MovingPoints | None = None,
+        linear_emission: bool = False,
     ) -> None:
         super().__init__()
         check_sizes(hidden_features=hidden_features, hidden_layers=hidden_layers)
         self.layout = layout
         self.scene_dimensions = scene_dimensions
+        self.linear_emission = linear_emission
         if not relative or moving is None:
             moving = MovingPoints.none(scene_dimensions)
         self.encoding = PixelEncoding(
@@ -74,7 +77,7 @@ class EncodedGenerator(nn.Module):
             encoded = self.encoding(pixels, scene_vector, precision)
             output: Tensor = self.mlp(encoded, scene_vector)
         output = output.to(pixels.dtype).unflatten(1, buffers.shape[1:3])
-        return add_known_light(output, buffers, self.layout)
+        return self._with_known_light(output, buffers)
 
     @torch.no_grad()
     def render(self, buffers: Tensor, scene_vector: Tensor) -> Tensor:
@@ -97,4 +100,8 @@ class EncodedGenerator(nn.Module):
                 output = torch.cat(in_parallel(output_of, pixels.split(CACHED_PIXELS)))
             else:
                 output = torch.cat([output_of(chunk) for chunk in pixels.split(MANY_PIXELS)])
-        return add_known_light(output.unflatten(0, buffers.shape[:2]), buffers, self.layout)
+        return self._with_known_light(output.unflatten(0, buffers.shape[:2]), buffers)
+
+    def _with_known_light(self, output: Tensor, buffers: Tensor) -> Tensor:
+        linear = self.linear_emission
+        return add_known_light(output, buffers, self.layout, linear_emission=linear)

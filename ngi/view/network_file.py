@@ -131,7 +131,12 @@ KNOWN_LIGHT = {
     ("direct",): "expm1(o + direct)",
     ("direct", "emission"): "expm1(o + log1p(expm1(direct) + expm1(emission)))",
 }
-"""The radiance, o being the network's own output in log1p space; by the channels there are."""
+LINEAR = {
+    ("emission",): "expm1(emission) + expm1(o)",
+    ("direct", "emission"): "expm1(emission) + expm1(o + direct)",
+}
+"""The radiance, o being the network's own output in log1p space, by the channels there are; in
+`LINEAR` emission is added to it as radiance."""
 EMITTER = f"expm1(emission) in channels where emission > {EMITTER_THRESHOLD:g}, elsewhere "
 ADDED = "; the file computes this itself, nothing is to be added to its radiance"
 COMPONENTS = (
@@ -166,7 +171,9 @@ def network_metadata(run: TrainedRun, precision_differs: float) -> dict[str, str
             if run.description is None
             else scene_metadata(run.description, run.samples.components)
         ),
-        "known_light": known_light(run.renderer.layout),
+        "known_light": known_light(
+            run.renderer.layout, linear=getattr(run.network, "linear_emission", False)
+        ),
         "radiance": RADIANCE,
     }
 
@@ -196,9 +203,11 @@ def scene_metadata(description: SceneDescription, seen: Sequence[int]) -> dict[s
     }
 
 
-def known_light(layout: BufferLayout) -> str:
-    """How the light that the buffers tell becomes part of the radiance."""
+def known_light(layout: BufferLayout, *, linear: bool) -> str:
+    """How the light that the buffers tell becomes part of the radiance, see `add_known_light`."""
     names = tuple(name for name in ("direct", "emission") if name in layout.names)
+    if linear and names in LINEAR:
+        return f"{LINEAR[names]}{ADDED}"
     return f"{EMITTER if 'emission' in names else ''}{KNOWN_LIGHT[names]}{ADDED}"
 
 

@@ -132,7 +132,10 @@ def test_the_file_says_what_its_inputs_are(
 OURS = partial(EncodedGenerator, octaves=3, directions=True)
 
 
-@pytest.mark.parametrize(("make", "dimensions"), [(PixelGenerator, 2), (OURS, 2), (OURS, 0)])
+@pytest.mark.parametrize(
+    ("make", "dimensions"),
+    [(PixelGenerator, 2), (OURS, 2), (OURS, 0), (partial(OURS, linear_emission=True), 2)],
+)
 def test_a_network_that_adds_direct_light_gives_the_same_numbers(make, dimensions: int) -> None:
     layout = BufferLayout(("position", "normal", "outgoing", "direct", "emission"))
     with torch.random.fork_rng():
@@ -141,6 +144,7 @@ def test_a_network_that_adds_direct_light_gives_the_same_numbers(make, dimension
             layout=layout, scene_dimensions=dimensions, hidden_features=8, hidden_layers=2
         )
         buffers, v = 2 * torch.rand(20, layout.channels), torch.rand(dimensions)
+    buffers[:5, layout.slice("emission")] = 0
     content = network_file(network, {})
     assert largest_difference(content, network, buffers, v) < 1e-5
     session = onnxruntime.InferenceSession(content, providers=["CPUExecutionProvider"])
@@ -150,21 +154,24 @@ def test_a_network_that_adds_direct_light_gives_the_same_numbers(make, dimension
     np.testing.assert_allclose(found, exact.exp() - 1, rtol=1e-5, atol=1e-5)
 
 
+@pytest.mark.parametrize("linear", [False, True])
 @pytest.mark.parametrize("names", KNOWN_LIGHT)
-def test_known_light_is_added_as_the_file_says(names: tuple[str, ...]) -> None:
+def test_known_light_is_added_as_the_file_says(names: tuple[str, ...], linear: bool) -> None:
     layout = BufferLayout(("position", *names))
     output, buffers = torch.rand(50, 3), 2 * torch.rand(50, layout.channels)
     channels = {name: buffers[:, layout.slice(name)].numpy() for name in names}
-    told, _, rest = known_light(layout).partition("; ")
+    told, _, rest = known_light(layout, linear=linear).partition("; ")
     assert "nothing is to be added" in rest
     emitter, _, formula = told.rpartition("elsewhere ")
     known = {"expm1": np.expm1, "log1p": np.log1p, "o": output.numpy(), **channels}
     expected = eval(formula, known)
-    if "emission" in names:
+    if "emission" in names and not linear:
         assert emitter == "expm1(emission) in channels where emission > 1, "
         bright = channels["emission"] > 1
         expected = np.where(bright, np.expm1(channels["emission"]), expected)
-    found = add_known_light(output, buffers, layout).expm1()
+    else:
+        assert emitter == ""
+    found = add_known_light(output, buffers, layout, linear_emission=linear).expm1()
     np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-6)
 
 
