@@ -53,6 +53,32 @@ def test_what_is_said_of_who_knows_where_the_rare_is_is_what_the_runs_say() -> N
         assert cell == f"{errors}: {', '.join(map(percent, change))} %"
 
 
+def test_what_an_oracle_takes_off_dear_patches_is_what_the_runs_say() -> None:
+    folder, run = ROOT / "docs/exploration-ceiling", ["scene", "choice", "patches", "steps", "seed"]
+    tables = [pd.read_csv(folder / name) for name in ("scarce_ceiling.csv", "scarce_seeds.csv")]
+    runs = pd.concat(tables).set_index(run).sort_index()
+    page = "docs/exploration-ceiling/scarce.md"
+    rows = rows_of(page, "What an oracle takes off")[2:9]
+    sizes = ((128, 800), (256, 1600), (512, 3200))
+    for row, scene in zip(rows, sorted(runs.index.unique("scene")), strict=True):
+        error = runs.loc[scene, "hard_error"]
+        for cell, size in zip(row[1:4], sizes, strict=True):
+            found = difference_of(error["uniform", *size], error["oracle", *size])
+            text, _, seeds = as_shown(found).partition(" % ")
+            if found.n < 3:
+                text = text.split(" ± ")[0]
+            assert cell == (f"{text} {seeds}" if found.n > 3 else text), (scene, size)
+        everything, half = error["uniform", 1024, 1600], error["uniform", 256, 1600]
+        assert row[4] == as_shown(difference_of(half, everything)).split(" ")[0]
+
+    shown = rows_of(page, "What comes near to it on bathroom")[2:]
+    new = tables[1].query("scene == 'bathroom' and patches == 256").set_index(["choice", "seed"])
+    for row, choice in zip(shown, ("oracle", "disagreement", "forest"), strict=True):
+        for cell, error in zip(row, ("hard_error", "hard_tail", "uniform_error"), strict=False):
+            found = difference_of(new.loc["uniform", error], new.loc[choice, error])
+            assert cell == as_shown(found).split(" %")[0]
+
+
 LEARNER = "With the paper's learner"
 
 
