@@ -1,0 +1,45 @@
+"""What the page of the learner says of where its error is left is what was measured."""
+
+import pandas as pd
+
+from ngi.files.resources import root
+from tests.docs.test_ceiling_figures import rows_of
+
+PAGE, SECTION = "docs/learner/README.md", "Where the error is left"
+COLUMNS = [f"{frames}_{of}" for frames in ("hard", "uniform") for of in ("error", "mae", "tail")]
+ONCE, ALONE = "1x, 16 rays", "alone without direct light"
+IMAGES = ("2x at edges, 16 rays", "2x, 16 rays", "2x, 4 rays", "1x, 64 rays")
+SCENES = ("living-room", "bathroom")
+
+
+def shown(changes: pd.Series) -> str:
+    texts = (f"{100 * change - 100:+.1f}" for change in changes)
+    return ", ".join(texts).replace("-0.0", "0.0").replace("-", "−")
+
+
+def test_what_emission_and_more_questions_at_edges_are_worth() -> None:
+    runs = pd.read_csv(root() / "docs/learner/edges.csv")
+    rows = iter(rows_of(PAGE, SECTION)[7:])
+    once = runs.query("image == @ONCE").set_index(["scene", "emission", "seed"])[COLUMNS]
+    assert next(rows)[0] == "hard frames: error"
+    next(rows)
+    for scene in SCENES:
+        changes = once.loc[scene, "emission as radiance"] / once.loc[scene, "emitters alone"]
+        assert next(rows) == [shown(changes.dropna()[column]) for column in COLUMNS]
+    one = runs.query("emission == @ALONE and seed == 1").set_index(["scene", "image"])[COLUMNS]
+    assert next(rows)[0] == "hard frames: error"
+    next(rows)
+    for scene in SCENES:
+        for image in IMAGES:
+            changes = one.loc[scene, image] / one.loc[scene, ONCE]
+            assert next(rows) == [shown(changes[[column]]) for column in COLUMNS]
+
+
+def test_which_pixels_hold_the_error() -> None:
+    shares = pd.read_csv(root() / "docs/learner/edge_shares.csv").set_index(["set", "pixels"])
+    kinds = ("emitter", "edge", "shadow", "specular", "rest")
+    for kind, row in zip(kinds, rows_of(PAGE, SECTION)[2:7], strict=True):
+        for cell, column in zip(row, shares.columns, strict=True):
+            each = [100 * shares.loc[(frames, kind), column] for frames in ("hard", "uniform")]
+            digits = 1 if max(each) < 0.5 else 0
+            assert cell == " / ".join(f"{share:.{digits}f}" for share in each) + " %"
