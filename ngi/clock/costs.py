@@ -75,7 +75,7 @@ def components(settings: Mapping[str, Any], *, renderer: Renderer, scored: bool)
         **_gpu(),
     }
     training = {
-        "model": _without(settings["model"], "linear_emission"),  # which costs nothing
+        "model": _costing_the_same(settings["model"]),
         **{part: settings[part] for part in ("loss", "trainer")},
         "optimizer": _without(settings["optimizer"], "lr", "adam_lr"),
         **_averaging(settings),
@@ -98,6 +98,12 @@ def components(settings: Mapping[str, Any], *, renderer: Renderer, scored: bool)
     if scored:
         found.append(Component("scoring", {"target": sampler["target"], **training}))
     return found
+
+
+def _costing_the_same(model: Mapping[str, Any]) -> dict[str, Any]:
+    """A network's settings, under the name that its costs had before emission was radiance."""
+    same = {"ngi.models.LinearEmissionGenerator": "ngi.models.EncodedGenerator"}
+    return {**model, "_target_": same.get(model["_target_"], model["_target_"])}
 
 
 def _proposing(sampler: Mapping[str, Any]) -> dict[str, Any]:

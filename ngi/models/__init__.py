@@ -1,7 +1,7 @@
 """The neural renderer, its loss, and what it says about single samples. PyTorch only."""
 
 from ngi.models.averaging import Averaging, exponential_average, no_average
-from ngi.models.encoded_generator import EncodedGenerator
+from ngi.models.encoded_generator import EncodedGenerator, LinearEmissionGenerator
 from ngi.models.image_layers import ImageLinear
 from ngi.models.loss import L1Dssim, SampleLoss
 from ngi.models.muon import MuonAdam
@@ -18,6 +18,7 @@ __all__ = [
     "EncodedGenerator",
     "ImageLinear",
     "L1Dssim",
+    "LinearEmissionGenerator",
     "MuonAdam",
     "PatchLinear",
     "PixelGenerator",

@@ -26,10 +26,12 @@ class EncodedGenerator(nn.Module):
     octaves, directions: see `PixelEncoding`
     relative: whether it is told where each pixel is relative to what moves
     moving: what moves, as a function of the vector that it is given
-    linear_emission: see `add_known_light`
 
     Under autocast everything between the encoding and the output is in the lower precision.
     """
+
+    linear_emission = False
+    """See `add_known_light`."""
 
     def __init__(
         self,
@@ -42,13 +44,11 @@ class EncodedGenerator(nn.Module):
         directions: bool,
         relative: bool = False,
         moving: MovingPoints | None = None,
-        linear_emission: bool = False,
     ) -> None:
         super().__init__()
         check_sizes(hidden_features=hidden_features, hidden_layers=hidden_layers)
         self.layout = layout
         self.scene_dimensions = scene_dimensions
-        self.linear_emission = linear_emission
         if not relative or moving is None:
             moving = MovingPoints.none(scene_dimensions)
         self.encoding = PixelEncoding(
@@ -105,3 +105,9 @@ class EncodedGenerator(nn.Module):
     def _with_known_light(self, output: Tensor, buffers: Tensor) -> Tensor:
         linear = self.linear_emission
         return add_known_light(output, buffers, self.layout, linear_emission=linear)
+
+
+class LinearEmissionGenerator(EncodedGenerator):
+    """The same, with emission added as radiance; ours."""
+
+    linear_emission = True

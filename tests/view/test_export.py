@@ -14,7 +14,7 @@ import torch
 
 from ngi.files.resources import root
 from ngi.machine.precision import multiplies_bfloat16
-from ngi.models import EncodedGenerator, PixelGenerator
+from ngi.models import EncodedGenerator, LinearEmissionGenerator, PixelGenerator
 from ngi.models.known_light import add_known_light
 from ngi.patches import BUFFER_CHANNELS, CHAIN_CHANNELS, DIRECT_CHANNELS, BufferLayout
 from ngi.scene import read_scene, scenes
@@ -129,12 +129,15 @@ def test_the_file_says_what_its_inputs_are(
     assert BUFFERS.keys() == BUFFER_CHANNELS.keys() | CHAIN_CHANNELS.keys() | DIRECT_CHANNELS.keys()
 
 
-OURS = partial(EncodedGenerator, octaves=3, directions=True)
+OURS, OLDER = (
+    partial(kind, octaves=3, directions=True)
+    for kind in (LinearEmissionGenerator, EncodedGenerator)
+)
 
 
 @pytest.mark.parametrize(
     ("make", "dimensions"),
-    [(PixelGenerator, 2), (OURS, 2), (OURS, 0), (partial(OURS, linear_emission=True), 2)],
+    [(PixelGenerator, 2), (OURS, 2), (OURS, 0), (OLDER, 2)],
 )
 def test_a_network_that_adds_direct_light_gives_the_same_numbers(make, dimensions: int) -> None:
     layout = BufferLayout(("position", "normal", "outgoing", "direct", "emission"))
