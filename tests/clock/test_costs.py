@@ -140,6 +140,11 @@ def test_how_fast_and_how_far_back_is_no_question_of_cost() -> None:
     assert keys(*learner) == keys(*learner, *changed)
 
 
+def test_how_emission_is_added_costs_nothing() -> None:
+    alone = keys("method=ours", "model=encoded_generator_emitters_alone")
+    assert keys("method=ours") == alone != keys("method=ours", "model=pixel_generator")
+
+
 def test_without_an_average_a_cost_is_called_as_before_there_were_any() -> None:
     assert run_config().averaging["_target_"] == NOT_AVERAGED
 
