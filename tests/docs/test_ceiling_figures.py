@@ -77,6 +77,8 @@ def test_what_an_oracle_takes_off_dear_patches_is_what_the_runs_say() -> None:
         for cell, error in zip(row, ("hard_error", "hard_tail", "uniform_error"), strict=False):
             found = difference_of(new.loc["uniform", error], new.loc[choice, error])
             assert cell == as_shown(found).split(" %")[0]
+        ranks = new.loc[choice, "rank_correlation"]
+        assert row[3] == ("1" if choice == "oracle" else f"{ranks.mean():.1f}")
 
 
 LEARNER = "With the paper's learner"

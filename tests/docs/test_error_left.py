@@ -3,7 +3,7 @@
 import pandas as pd
 
 from ngi.files.resources import root
-from tests.docs.test_ceiling_figures import rows_of
+from tests.docs.test_ceiling_figures import rows_of, tenths
 
 PAGE, SECTION = "docs/learner/README.md", "Where the error is left"
 COLUMNS = [f"{frames}_{of}" for frames in ("hard", "uniform") for of in ("error", "mae", "tail")]
@@ -13,8 +13,7 @@ SCENES = ("living-room", "bathroom")
 
 
 def shown(changes: pd.Series) -> str:
-    texts = (f"{100 * change - 100:+.1f}" for change in changes)
-    return ", ".join(texts).replace("-0.0", "0.0").replace("-", "−")
+    return ", ".join(map(tenths, changes - 1)).replace("−0.0", "0.0")
 
 
 def test_what_emission_and_more_questions_at_edges_are_worth() -> None:
