@@ -34,6 +34,9 @@ from ngi.render.protocol import Renderer
 Costs = dict[str, dict[str, float]]
 """Component -> phase -> seconds per step that the component belongs to."""
 
+OF_IMAGES = "supersampled_edges"
+"""What of the samples' settings concerns no step."""
+
 NOT_AVERAGED = "ngi.models.no_average"
 """What conf/averaging/none.yaml names."""
 
@@ -63,7 +66,11 @@ def components(settings: Mapping[str, Any], *, renderer: Renderer, scored: bool)
     scored: whether its sampler looks at the targets of the chains' current states.
     """
     sampler = settings["sampler"]
-    samples = {key: value for key, value in settings["data"].items() if not key.startswith("_")}
+    samples = {
+        key: value
+        for key, value in settings["data"].items()
+        if not key.startswith("_") and key != OF_IMAGES
+    }
     if renderer.halves:  # else nothing: what is measured already stays what it is called
         samples["halves"] = True
     patches = {

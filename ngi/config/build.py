@@ -86,6 +86,7 @@ def build_module(
         loss=instantiate(config.loss),
         optimizer=instantiate(config.optimizer),
         example=samples.example,
+        render=samples.render,
         stream=stream,
         guard=learn.StepGuard(stream=stream, folder=folder),
         averaging=instantiate(config.averaging),

@@ -27,7 +27,7 @@ Predict = Callable[..., Tensor]
 """(buffers [H, W, C], *test inputs) -> log1p of linear radiance [H, W, 3]; on any device."""
 
 TestInputs = Callable[..., tuple[Tensor, ...]]
-"""(v [D], resolution=pixels a side) -> what a prediction needs beside the buffers."""
+"""(v [D], buffers [H, W, C]) -> what a prediction needs beside the buffers."""
 
 
 @dataclass(frozen=True)
@@ -77,11 +77,13 @@ class Evaluator:
         for frame, reference in zip(self._frames, self._references(), strict=True):
             seconds: dict[str, float] = {}
             digest.update(f"{frame.set}/{frame.index}/{reference.content_hash}\n".encode())
+            v = frame.scene_vector
+            buffers = timed(seconds, "buffers", self._buffers, v)
             prepared.append(
                 _PreparedFrame(
                     frame=frame,
-                    buffers=timed(seconds, "buffers", self._buffers, frame.scene_vector),
-                    inputs=timed(seconds, "inputs", self._inputs, frame.scene_vector),
+                    buffers=buffers,
+                    inputs=timed(seconds, "inputs", self._inputs, v, buffers),
                     seconds=seconds,
                     reference=reference,
                     floor=self._measure(frame, reference.half_a, reference.radiance),
@@ -158,8 +160,8 @@ class Evaluator:
         buffers = self._renderer.image_buffers(v, resolution=self.protocol.resolution)
         return buffers.detach().cpu().float()
 
-    def _inputs(self, v: Tensor) -> tuple[Tensor, ...]:
-        inputs = self._test_inputs(v, resolution=self.protocol.resolution)
+    def _inputs(self, v: Tensor, buffers: Tensor) -> tuple[Tensor, ...]:
+        inputs = self._test_inputs(v, buffers)
         return tuple(tensor.detach().cpu() for tensor in inputs)
 
     def _measure(self, frame: Frame, prediction: Tensor, reference: Tensor) -> FrameMetrics:

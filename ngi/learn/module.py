@@ -18,7 +18,7 @@ from ngi.learn.checkpoint import STEP_GUARD
 from ngi.learn.graph_trainer import GraphTrainer
 from ngi.learn.lightning_api import LightningModule
 from ngi.learn.outcome import Step
-from ngi.learn.samples import Example
+from ngi.learn.samples import Example, image_of
 from ngi.learn.scorer import Scorer
 from ngi.learn.state_before import StateBefore
 from ngi.learn.step import Learner, training_step
@@ -39,6 +39,7 @@ class IlluminationModule(LightningModule):
     network, loss, example, stream, guard: see `Learner`
     optimizer: makes the optimiser from the parameters
     averaging: makes the average of the network's weights that `predict` uses in their place
+    render: a network's image of what `predict` is given, see `Samples.render`
     """
 
     def __init__(
@@ -51,6 +52,7 @@ class IlluminationModule(LightningModule):
         stream: TrainingStream,
         guard: StepGuard,
         averaging: Averaging = no_average,
+        render: Callable[..., Tensor] = image_of,
     ) -> None:
         super().__init__()
         self.automatic_optimization = False  # the step function says what happens, and when
@@ -59,6 +61,7 @@ class IlluminationModule(LightningModule):
         self.loss = loss
         self._make_optimizer = optimizer
         self._example = example
+        self._render = render
         self._clock = stream.clock
         self._image: Function = self._rendered
         self.learner = Learner(
@@ -158,7 +161,7 @@ class IlluminationModule(LightningModule):
         return self.network if self.averaged is None else self.averaged.module
 
     def _rendered(self, *inputs: Tensor) -> tuple[Tensor]:
-        return (self._shown.render(*inputs),)  # type: ignore[operator]
+        return (self._render(self._shown, *inputs),)
 
     def _check_inputs(self, patches: Patches) -> None:
         if not hasattr(self.network, "render"):

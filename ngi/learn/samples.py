@@ -9,6 +9,7 @@ import torch
 from torch import Tensor, nn
 
 from ngi.denoise import Denoiser, denoised
+from ngi.learn.supersampling import quarters, with_quarters
 from ngi.patches import BufferLayout, Patches
 from ngi.render.protocol import Deferred, PatchJob, Renderer
 
@@ -64,12 +65,19 @@ class Samples(Protocol):
         """What the network is given of [n] samples, and what it is to answer."""
         ...
 
-    def test_inputs(self, scene_vector: Tensor, *, resolution: int) -> tuple[Tensor, ...]:
-        """The network's inputs beside the buffers for an image of a v [D], without the axis n.
+    def test_inputs(
+        self, scene_vector: Tensor, buffers: Tensor, *, preview: bool = False
+    ) -> tuple[Tensor, ...]:
+        """What `render` needs beside the buffers [H, W, C] of the image of a v [D].
 
+        preview: of a picture that the next one soon replaces, for which less may do
         What has to be rendered for them belongs to the time that a frame takes.
         """
         ...
+
+    def render(self, network: nn.Module, buffers: Tensor, *inputs: Tensor) -> Tensor:
+        """The network's image [H, W, 3], log1p radiance, of buffers and `test_inputs`."""
+        return image_of(network, buffers, *inputs)
 
 
 class PatchSamples(Samples):
@@ -81,6 +89,8 @@ class PatchSamples(Samples):
         buffers say where the point is and which direction
     denoiser: takes the noise off newly traced radiance, or None
     traced_share: see `ngi.denoise.denoised`
+    supersampled_edges: whether the network is asked for each quarter of the pixels that show
+        several surfaces, see `ngi.learn.supersampling`; in images alone, not in training
 
     components: which of v, [0, D), the network is given, in order
     Raises ValueError for a share that is none.
@@ -93,10 +103,12 @@ class PatchSamples(Samples):
         camera: bool = True,
         denoiser: Denoiser | None = None,
         traced_share: float = 0.5,
+        supersampled_edges: bool = False,
     ) -> None:
         if not 0 <= traced_share <= 1:
             raise ValueError(f"data.traced_share is {traced_share}; expected 0 to 1")
         self._renderer = renderer
+        self._supersampled_edges = supersampled_edges
         self.layout = renderer.layout
         self._denoise = None
         if denoiser is not None:
@@ -124,15 +136,34 @@ class PatchSamples(Samples):
         (buffers, scene_vectors), log_radiance = patch_example(patches)
         return (buffers, self._of(scene_vectors)), log_radiance
 
-    def test_inputs(self, scene_vector: Tensor, *, resolution: int) -> tuple[Tensor, ...]:  # noqa: ARG002
-        """Just v [D], or what is seen of it."""
-        return (self._of(scene_vector),)
+    def test_inputs(
+        self, scene_vector: Tensor, buffers: Tensor, *, preview: bool = False
+    ) -> tuple[Tensor, ...]:
+        """V [D], or what is seen of it, and of a supersampled image `quarters`."""
+        seen = self._of(scene_vector)
+        if preview or not self._supersampled_edges:
+            return (seen,)
+        return seen, *quarters(scene_vector, buffers, self._renderer)
+
+    def render(self, network: nn.Module, buffers: Tensor, *inputs: Tensor) -> Tensor:
+        seen, *finer = inputs
+        image = image_of(network, buffers, seen)
+        if not finer:
+            return image
+        pixels, of_quarters = finer
+        return with_quarters(image, pixels, image_of(network, of_quarters, seen))
 
     def _of(self, scene_vectors: Tensor) -> Tensor:
         if len(self.components) == self.dimensions:
             return scene_vectors
         # By slices: a GPU would be waited for with a list of indices, which is uploaded.
         return torch.cat([scene_vectors[..., part] for part in self._seen], dim=-1)
+
+
+def image_of(network: nn.Module, *inputs: Tensor) -> Tensor:
+    """What the network itself makes of an image."""
+    image: Tensor = network.render(*inputs)  # type: ignore[operator]
+    return image
 
 
 def network_of(samples: Samples, make: Callable[..., nn.Module]) -> nn.Module:

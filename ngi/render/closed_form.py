@@ -110,6 +110,12 @@ class ClosedFormRenderer(Renderer):
         buffers, _ = self.whole_image(scene_vector, resolution)
         return buffers
 
+    def pixel_buffers(self, scene_vector: Tensor, pixels: Tensor, *, resolution: int) -> Tensor:
+        corners = torch.stack([pixels % resolution, pixels // resolution], dim=-1)
+        points = _pixel_centres(corners, 1, resolution).view(1, -1, 1, 2)
+        buffers, _ = self.shade(scene_vector[None], points)
+        return buffers[0, :, 0]
+
     def cameras(self, scene_vectors: Tensor) -> Tensor:
         return torch.zeros(len(scene_vectors), 6)
 

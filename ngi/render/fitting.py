@@ -7,13 +7,15 @@ what workers render is rendered again.
 
 import logging
 from collections.abc import Callable, Iterable
-from dataclasses import replace
-from math import inf
+from math import inf, prod
+from typing import TypeVar
 
 import torch
 from torch import Tensor
 
-from ngi.render.tracing import Pending, Tracer, Window, derive_seed
+from ngi.render.tracing import Pending, Pixels, Tracer, Window, derive_seed
+
+Part = TypeVar("Part", bound=Pixels)
 
 _logger = logging.getLogger(__name__)
 
@@ -57,14 +59,14 @@ class FittingTracer(Tracer):
     def radiance(self, window: Window, *, samples: int, seed: int) -> Pending:
         whole = self._attempt(
             "radiance",
-            _pixels(window) * samples,
+            prod(window.shape) * samples,
             lambda: self._tracer.radiance(window, samples=samples, seed=seed),
         )
         if whole is not None:
             return whole
-        self._halve(window, samples)
         seeds = [derive_seed(seed, half) for half in range(2)]
         if samples > 1:
+            self.split += 1
             counts = [samples - samples // 2, samples // 2]
             halves = [
                 self.radiance(window, samples=n, seed=s) for n, s in zip(counts, seeds, strict=True)
@@ -72,20 +74,24 @@ class FittingTracer(Tracer):
             return lambda: _weighted_mean([half() for half in halves], counts)
         return _stacked(
             self.radiance(half, samples=1, seed=s)
-            for half, s in zip(_halves(window), seeds, strict=True)
+            for half, s in zip(
+                self._counted(window.halves(), prod(window.shape)), seeds, strict=True
+            )
         )
 
-    def buffers(self, window: Window, *, samples: int) -> Pending:
+    def buffers(self, pixels: Pixels, *, samples: int) -> Pending:
         """The same numbers, however it is split."""
         whole = self._attempt(
             "buffers",
-            _pixels(window) * samples,
-            lambda: self._tracer.buffers(window, samples=samples),
+            prod(pixels.shape) * samples,
+            lambda: self._tracer.buffers(pixels, samples=samples),
         )
         if whole is not None:
             return whole
-        self._halve(window, 1)
-        return _stacked(self.buffers(half, samples=samples) for half in _halves(window))
+        return _stacked(
+            self.buffers(half, samples=samples)
+            for half in self._counted(pixels.halves(), prod(pixels.shape))
+        )
 
     def _attempt(self, what: str, size: int, launch: Callable[[], Pending]) -> Pending | None:
         """None for what does not fit."""
@@ -110,25 +116,15 @@ class FittingTracer(Tracer):
         self._too_large[what] = size
         return None
 
-    def _halve(self, window: Window, samples: int) -> None:
-        if samples == 1 and window.height == 1:
+    def _counted(self, halves: tuple[Part, Part] | None, size: int) -> tuple[Part, Part]:
+        if halves is None:
             raise RuntimeError(
-                f"not even {window.width} pixels with one sample fit into memory; free it "
+                f"not even {size} pixels with one sample fit into memory; free it "
                 "(`nvidia-smi` says what holds it), lower renderer.workers or the sizes of the "
                 "scene's meshes and textures, or choose renderer.backend=llvm"
             )
         self.split += 1
-
-
-def _pixels(window: Window) -> int:
-    return window.width * window.height
-
-
-def _halves(window: Window) -> tuple[Window, Window]:
-    """The upper rows and the lower ones."""
-    rows = window.height - window.height // 2
-    lower = replace(window, y=window.y + rows, height=window.height - rows)
-    return replace(window, height=rows), lower
+        return halves
 
 
 def _stacked(parts: Iterable[Pending]) -> Pending:

@@ -11,6 +11,7 @@ import gc
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import prod
 from typing import Any
 
 import torch
@@ -22,7 +23,7 @@ from ngi.render.caustics import Caustics, photon_points
 from ngi.render.direct_light import light_points
 from ngi.render.first_hit import FirstHit
 from ngi.render.fitting import does_not_fit
-from ngi.render.tracing import Pending, Tracer, Window, subpixel_points
+from ngi.render.tracing import Pending, Pixels, Tracer, Window, subpixel_points
 
 Trace = Callable[..., "list[mi.Float]"]
 
@@ -72,6 +73,7 @@ class JitTracer(Tracer):
         def trace_buffers(
             scene: mi.Scene,
             view: _View,
+            numbers: list[mi.UInt32],
             points: mi.Point2f,
             light_points: list[mi.Float],
             light: list[mi.Float],
@@ -81,11 +83,12 @@ class JitTracer(Tracer):
             index = dr.arange(mi.UInt32, rays)
             pixel = index // view.samples
             sample = index - pixel * view.samples
+            for listed in numbers:  # one list, or none where the window's pixels are asked for
+                pixel = dr.gather(mi.UInt32, listed, pixel)
             jitter = dr.gather(mi.Point2f, points, sample)
-            light_point = [dr.gather(mi.Float, numbers, sample) for numbers in light_points]
+            light_point = [dr.gather(mi.Float, each, sample) for each in light_points]
             ray = view.rays(scene, pixel, jitter)
-            channels = first_hit.channels(scene, ray, light_point, *light)
-            return _block_sums(channels, samples)
+            return _block_sums(first_hit.channels(scene, ray, light_point, *light), samples)
 
         self._radiance = _replayed(trace_radiance, recorded=recorded)
         self._buffers = _replayed(trace_buffers, recorded=recorded)
@@ -97,18 +100,22 @@ class JitTracer(Tracer):
         view = _View.of(window, samples)
         paths = window.width * window.height * samples
         sums = self._radiance(self._scene, view, dr.opaque(mi.UInt32, seed), samples, paths)
-        return _pending(sums, window, samples)
+        return _pending(sums, window.shape, samples)
 
-    def buffers(self, window: Window, *, samples: int) -> Pending:
+    def buffers(self, pixels: Pixels, *, samples: int) -> Pending:
+        if isinstance(pixels, Window):
+            window, numbers = pixels, []
+        else:
+            side = pixels.resolution
+            window, numbers = Window(0, 0, side, side, side), [mi.UInt32(pixels.numbers.numpy())]
         self._prepare(window)
         if samples not in self._points:
             self._points[samples] = _points(samples)
-        view = _View.of(window, samples)
-        rays = window.width * window.height * samples
+        view, rays = _View.of(window, samples), prod(pixels.shape) * samples
         points = self._points[samples]
         light = [] if self._light is None else self._light.now()
-        sums = self._buffers(self._scene, view, *points, light, samples, rays)
-        return _pending(sums, window, samples)
+        sums = self._buffers(self._scene, view, numbers, *points, light, samples, rays)
+        return _pending(sums, pixels.shape, samples)
 
     def _prepare(self, window: Window) -> None:
         """Before the first recording.
@@ -239,9 +246,9 @@ def _block_sums(values: list[mi.Float], samples: int) -> list[mi.Float]:
     return sums
 
 
-def _pending(sums: list[mi.Float], window: Window, samples: int) -> Pending:
+def _pending(sums: list[mi.Float], shape: tuple[int, ...], samples: int) -> Pending:
     def read() -> Tensor:
         mean = stacked(sums).div_(samples)
-        return mean.view(window.height, window.width, len(sums))
+        return mean.view(*shape, len(sums))
 
     return read

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import logging
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
@@ -14,12 +15,15 @@ from ngi.machine.backend import activate, describe, mi
 from ngi.render.first_hit import first_hit_of
 from ngi.render.fitting import FittingTracer
 from ngi.render.needs import buffers_are_static
-from ngi.render.projection import Projection, require_told_camera
+from ngi.render.projection import Projection, require_perspective, require_told_camera
 from ngi.render.protocol import RenderedPatches, Renderer
 from ngi.render.tracers import tracer_of
 from ngi.render.tracing import (
+    PATHS_PER_LAUNCH,
     SAMPLES_PER_PASS,
     Pending,
+    PixelList,
+    Pixels,
     bands,
     check_states,
     choose,
@@ -90,7 +94,7 @@ class MitsubaRenderer(Renderer):
         # Scenes of a sweep's finished jobs are left in cycles, and slow every launch down.
         gc.collect()
         self._scene = VariableScene(scene, arrange=needed_only)
-        self._check_camera()
+        require_perspective(self._scene)
         first_hit = first_hit_of(
             self._scene,
             needed_only=needed_only,
@@ -187,6 +191,14 @@ class MitsubaRenderer(Renderer):
         self._scene.apply(scene_vector)
         return self._encode(self._whole_buffers(resolution, samples))
 
+    def pixel_buffers(self, scene_vector: Tensor, pixels: Tensor, *, resolution: int) -> Tensor:
+        require_positive(resolution=resolution)
+        mi.set_variant(self._variant)
+        self._scene.apply(scene_vector)
+        parts = pixels.cpu().split(max(1, PATHS_PER_LAUNCH // self.buffer_samples))
+        listed = [PixelList(part, resolution) for part in parts]
+        return self._encode(self._mean_buffers(listed, self.buffer_samples))
+
     def cameras(self, scene_vectors: Tensor) -> Tensor:
         require_told_camera(self._scene)
         return torch.from_numpy(self._scene.description.cameras(scene_vectors.numpy())).float()
@@ -241,9 +253,12 @@ class MitsubaRenderer(Renderer):
         return radiance, lambda: buffers
 
     def _whole_buffers(self, resolution: int, samples: int) -> Tensor:
-        """[H, W, C] of the scene as it stands, radiance linear; no NaN or Inf."""
-        all_bands = bands(resolution, samples)
-        return _masked(torch.cat([self._tracer.buffers(b, samples=samples)() for b in all_bands]))
+        """[H, W, C] of the scene as it stands, as `_mean_buffers`."""
+        return self._mean_buffers(bands(resolution, samples), samples)
+
+    def _mean_buffers(self, parts: Sequence[Pixels], samples: int) -> Tensor:
+        """[..., C] of all of them one after the other, radiance linear; no NaN or Inf."""
+        return _masked(torch.cat([self._tracer.buffers(p, samples=samples)() for p in parts]))
 
     def _encode(self, buffers: Tensor) -> Tensor:
         """Emission and direct light become log1p of their means, in place."""
@@ -251,26 +266,6 @@ class MitsubaRenderer(Renderer):
             if name in self.layout.names:
                 buffers[..., self.layout.slice(name)].log1p_()
         return buffers
-
-    def _check_camera(self) -> None:
-        sensor, path = self._scene.scene.sensors()[0], self._scene.description.document.path
-        if sensor.class_name() != "PerspectiveCamera":
-            raise ValueError(
-                f"{path}: the camera is a {sensor.class_name()}; make it <sensor "
-                "type='perspective'>: rays all begin in one point here"
-            )
-        film = sensor.film()
-        width, height = film.size()
-        if [*film.crop_size(), *film.crop_offset()] != [width, height, 0, 0]:
-            raise ValueError(
-                f"{path}: the film shows a part of its picture; take crop_width, crop_height, "
-                "crop_offset_x and crop_offset_y out"
-            )
-        if width != height:
-            raise ValueError(
-                f"{path}: the film is {width} x {height}; make width and height equal, since the "
-                "virtual image is a square"
-            )
 
 
 class HalvesRenderer(MitsubaRenderer):

@@ -16,6 +16,28 @@ def require_told_camera(scene: VariableScene) -> None:
         )
 
 
+def require_perspective(scene: VariableScene) -> None:
+    """Raises ValueError where the camera is no perspective one with a whole square film."""
+    sensor, path = scene.scene.sensors()[0], scene.description.document.path
+    if sensor.class_name() != "PerspectiveCamera":
+        raise ValueError(
+            f"{path}: the camera is a {sensor.class_name()}; make it <sensor "
+            "type='perspective'>: rays all begin in one point here"
+        )
+    film = sensor.film()
+    width, height = film.size()
+    if [*film.crop_size(), *film.crop_offset()] != [width, height, 0, 0]:
+        raise ValueError(
+            f"{path}: the film shows a part of its picture; take crop_width, crop_height, "
+            "crop_offset_x and crop_offset_y out"
+        )
+    if width != height:
+        raise ValueError(
+            f"{path}: the film is {width} x {height}; make width and height equal, since the "
+            "virtual image is a square"
+        )
+
+
 class Projection:
     """The perspective camera of a scene, as matrices that take points to the film.
 

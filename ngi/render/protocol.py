@@ -133,6 +133,13 @@ class Renderer(Protocol):
         """
         ...
 
+    def pixel_buffers(self, scene_vector: Tensor, pixels: Tensor, *, resolution: int) -> Tensor:
+        """[n, C] float32: what `image_buffers` has at n pixels, without making the others.
+
+        pixels: [n] int64, of the image's, counted from 0 row by row; n >= 1
+        """
+        ...
+
     def cameras(self, scene_vectors: Tensor) -> Tensor:
         """[n, 6] float32, for v [n, D]: where the camera stands and where it looks to.
 

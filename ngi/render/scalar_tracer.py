@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from itertools import product
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -9,7 +12,7 @@ from numpy.typing import NDArray
 from ngi.machine.backend import mi
 from ngi.render.direct_light import light_points
 from ngi.render.first_hit import FirstHit
-from ngi.render.tracing import Pending, Tracer, Window, subpixel_points
+from ngi.render.tracing import Pending, PixelList, Pixels, Tracer, Window, subpixel_points
 
 
 class ScalarTracer(Tracer):
@@ -41,14 +44,12 @@ class ScalarTracer(Tracer):
         result = torch.from_numpy(np.array(image, dtype=np.float32))
         return lambda: result
 
-    def buffers(self, window: Window, *, samples: int) -> Pending:
+    def buffers(self, pixels: Pixels, *, samples: int) -> Pending:
         points, lights = subpixel_points(samples), light_points(samples).tolist()
         means = [
-            self._pixel(points, lights, window.x + column, window.y + row, window.resolution)
-            for row in range(window.height)
-            for column in range(window.width)
+            self._pixel(points, lights, x, y, pixels.resolution) for y, x in _coordinates(pixels)
         ]
-        numbers = np.array(means, dtype=np.float32).reshape(window.height, window.width, -1)
+        numbers = np.array(means, dtype=np.float32).reshape(*pixels.shape, -1)
         result = torch.from_numpy(numbers)
         return lambda: result
 
@@ -70,6 +71,14 @@ class ScalarTracer(Tracer):
             samples.append(self._first_hit.channels(self._scene, ray, light_point))
         mean: NDArray[np.float64] = np.mean(np.array(samples, dtype=np.float64), axis=0)
         return mean
+
+
+def _coordinates(pixels: Pixels) -> Iterable[tuple[int, int]]:
+    """Row and column of each."""
+    if isinstance(pixels, PixelList):
+        return (divmod(number, pixels.resolution) for number in pixels.numbers.tolist())
+    rows = range(pixels.y, pixels.y + pixels.height)
+    return product(rows, range(pixels.x, pixels.x + pixels.width))
 
 
 def _box_filtered_copy(sensor: mi.Sensor) -> mi.Sensor:

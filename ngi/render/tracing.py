@@ -3,18 +3,21 @@
 And how many paths it asks for at a time.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from hashlib import blake2b
 from typing import Protocol
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
 Pending = Callable[[], Tensor]
-"""Waits for a computation that may still be running and returns its [height, width, channels],
-float32, on the device that computed it."""
+"""Waits for a computation that may still be running and returns its [height, width, channels], of a
+list of pixels [n, channels], float32, on the device that computed it."""
 
 
 @dataclass(frozen=True)
@@ -27,15 +30,52 @@ class Window:
     height: int
     resolution: int
 
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return self.height, self.width
+
+    def halves(self) -> tuple[Window, Window] | None:
+        """The upper rows and the lower ones; None of a single row."""
+        if self.height == 1:
+            return None
+        rows = self.height - self.height // 2
+        lower = replace(self, y=self.y + rows, height=self.height - rows)
+        return replace(self, height=rows), lower
+
+
+@dataclass(frozen=True)
+class PixelList:
+    """Any pixels of a square image of `resolution` pixels a side.
+
+    numbers: [n] int64 on the CPU, counted from 0 row by row
+    """
+
+    numbers: Tensor
+    resolution: int
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return (len(self.numbers),)
+
+    def halves(self) -> tuple[PixelList, PixelList] | None:
+        """None of a single pixel."""
+        if len(self.numbers) == 1:
+            return None
+        first, *rest = self.numbers.split(-(-len(self.numbers) // 2))
+        return replace(self, numbers=first), replace(self, numbers=torch.cat(rest))
+
+
+Pixels = Window | PixelList
+
 
 class Tracer(Protocol):
-    """Traces camera rays through the pixels of a window of the scene as it stands."""
+    """Traces camera rays through pixels of the scene as it stands."""
 
     def radiance(self, window: Window, *, samples: int, seed: int) -> Pending:
         """Mean linear RGB radiance over `samples` paths per pixel, box-filtered. seed: 32 bits."""
         ...
 
-    def buffers(self, window: Window, *, samples: int) -> Pending:
+    def buffers(self, pixels: Pixels, *, samples: int) -> Pending:
         """Mean first-hit channels (radiance linear) over the same sub-pixel points everywhere.
 
         samples: how many there are in each pixel

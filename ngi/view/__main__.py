@@ -23,6 +23,10 @@ class ViewOptions:
 
     run: str = option("a run's folder, finished or not")
     resolution: int = option("pixels a side at first", 256)
+    supersampled_edges: bool = option(
+        "ask the network four times a pixel at edges: still pictures take longer",
+        False,
+    )
     port: int = option("of the page", 8080)
     host: str = option(
         "0.0.0.0 lets other machines in, everybody who can reach this one", "127.0.0.1"
@@ -42,7 +46,11 @@ def view(options: ViewOptions) -> None:
 
     if options.resolution < 1:
         raise ValueError(f"resolution: {options.resolution}: give at least 1")
-    run = TrainedRun.open(Path(options.run), scene_path=options.scene)
+    run = TrainedRun.open(
+        Path(options.run),
+        scene_path=options.scene,
+        supersampled_edges=options.supersampled_edges,
+    )
     studio = Studio(renderer=run.renderer, predict=run.predict)
     shown = subject(
         name=f"{run.scene_name}, step {run.step:,}",

@@ -96,7 +96,7 @@ def _inputs(run: TrainedRun, frame: Tensor, v: Tensor) -> dict[str, tuple[Tensor
 
     generator = torch.Generator().manual_seed(0)
     pixels = torch.rand(RANDOM_PIXELS, frame.shape[-1], generator=generator)
-    (seen,) = run.samples.test_inputs(v, resolution=len(frame))
+    (seen,) = run.samples.test_inputs(v, frame, preview=True)
     size = f"{len(frame)} × {len(frame)}"
     return {
         f"{RANDOM_PIXELS} random pixels": (pixels, torch.rand(len(seen), generator=generator)),

@@ -132,8 +132,8 @@ def live_view(
         scene=None,
     )
 
-    def predict(buffers: Tensor, v: Tensor) -> Tensor:
-        inputs = run.samples.test_inputs(v, resolution=len(buffers))
+    def predict(buffers: Tensor, v: Tensor, *, preview: bool) -> Tensor:
+        inputs = run.samples.test_inputs(v, buffers, preview=preview)
         return run.module.predict(buffers, *inputs)
 
     studio = Studio(renderer=run.renderer, predict=predict)

@@ -56,11 +56,18 @@ class PathTracedRun(OpenedRun):
         return self.path_tracing.radiance(scene_vector, resolution=resolution)
 
 
-def open_run(folder: Path, *, scene_path: Path | str | None = None) -> TrainedRun | PathTracedRun:
-    """Whichever of the two the folder holds; raises what their `open` raises."""
+def open_run(
+    folder: Path, *, scene_path: Path | str | None = None, supersampled_edges: bool = False
+) -> TrainedRun | PathTracedRun:
+    """Whichever of the two the folder holds; raises what their `open` raises.
+
+    supersampled_edges: see `TrainedRun.open`; path tracing shows edges as they are
+    """
     with settings_of(folder) as settings:
-        kind = PathTracedRun if "path_tracing" in settings else TrainedRun
-    return kind.open(folder, scene_path=scene_path)
+        path_traced = "path_tracing" in settings
+    if path_traced:
+        return PathTracedRun.open(folder, scene_path=scene_path)
+    return TrainedRun.open(folder, scene_path=scene_path, supersampled_edges=supersampled_edges)
 
 
 def _denoiser(settings: dict[str, Any] | None) -> Denoiser | None:

@@ -40,6 +40,9 @@ class PictureOptions:
     resolution: int = option("pixels a side", 256)
     exposure: float = option("stops, of PNG files", 0.0)
     reference: int = option("samples per pixel of a path-traced picture beside it, with errors", 0)
+    supersampled_edges: bool = option(
+        "ask the network four times a pixel at edges: less error, longer frames", False
+    )
     scene: str | None = option("of a run of the authors' files: their folder", None)
 
 
@@ -57,7 +60,11 @@ def write_picture(options: PictureOptions) -> None:
     check_output(out, *SUFFIXES)
     if not options.resolution >= 1 or not options.reference >= 0:
         raise ValueError("resolution has to be at least 1, reference at least 0")
-    run = TrainedRun.open(Path(options.run), scene_path=options.scene)
+    run = TrainedRun.open(
+        Path(options.run),
+        scene_path=options.scene,
+        supersampled_edges=options.supersampled_edges,
+    )
     with closing(run.renderer):
         if options.reference and options.resolution < run.protocol.smallest_resolution:
             raise ValueError(

@@ -107,15 +107,26 @@ def made_by(settings: dict[str, Any], group: str) -> Callable[..., Any]:
     return make
 
 
-def make_samples(settings: dict[str, Any], renderer: Renderer) -> Samples:
+def make_samples(
+    settings: dict[str, Any], renderer: Renderer, *, supersampled_edges: bool = False
+) -> Samples:
     """What was trained on; patches, where the run is older than the group `data`.
 
+    supersampled_edges: of images, though the run has them as its network is asked once. ValueError
+        for a network of whole images
     Parts of it that are objects, such as a denoiser, are for new samples, which nobody asks for.
     """
-    if "data" not in settings:
-        return PatchSamples(renderer=renderer)
-    numbers = {k: v for k, v in plain(settings["data"]).items() if not isinstance(v, dict)}
-    samples: Samples = made_by(settings, "data")(**numbers, renderer=renderer)
+    data = settings.get("data", {})
+    make = made_by(settings, "data") if data else PatchSamples
+    numbers = {k: v for k, v in plain(data).items() if not isinstance(v, dict)}
+    if supersampled_edges:
+        if make is not PatchSamples:
+            raise ValueError(
+                "supersampled_edges: this run's network makes whole images of "
+                f"{make.__name__}, and can not be asked for quarters of a pixel; leave it out"
+            )
+        numbers["supersampled_edges"] = True
+    samples: Samples = make(**numbers, renderer=renderer)
     return samples
 
 

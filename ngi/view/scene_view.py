@@ -9,8 +9,8 @@ from torch import Tensor
 
 from ngi.render import Renderer
 
-Predict = Callable[[Tensor, Tensor], Tensor]
-"""(buffers [H, W, C], v [D]) -> log1p of linear radiance [H, W, 3]."""
+Predict = Callable[..., Tensor]
+"""(buffers [H, W, C], v [D], preview=whether less may do) -> log1p of linear radiance [H, W, 3]."""
 
 PASS_SAMPLES = 8
 """Samples per pixel of one pass of the path-traced picture."""
@@ -18,7 +18,10 @@ PASS_SAMPLES = 8
 
 @dataclass(frozen=True)
 class Place:
-    """Where to look: v, pixels a side, and rays per pixel of the buffers, None for the scene's."""
+    """Where to look: v, pixels a side, and rays per pixel of the buffers.
+
+    rays: None for the scene's number; any other makes a preview
+    """
 
     v: tuple[float, ...]
     resolution: int
@@ -58,9 +61,10 @@ class SceneView:
     def prediction(self) -> Tensor:
         """[H, W, 3] linear radiance; negative where the network says so."""
         if self._prediction is None:
-            buffers = self.buffers
+            buffers, preview = self.buffers, self.place.rays is not None
             self._prediction = self._timed(
-                "network", lambda: torch.expm1(self.predict(buffers, self.place.tensor()))
+                "network",
+                lambda: self.predict(buffers, self.place.tensor(), preview=preview).expm1(),
             )
         return self._prediction
 

@@ -105,15 +105,18 @@ class Pace:
 
     def __init__(self, rays: int) -> None:
         self._rays = rays
-        self._seconds: dict[str, dict[int, float]] = {}  # by part and its units, oldest first
+        # Of whole pictures and of previews, by part and its units, oldest first.
+        self._seconds: dict[bool, dict[str, dict[int, float]]] = {}
 
     def measured(self, view: SceneView) -> None:
         """A picture was made; of its parts the seconds are known."""
-        before, self._seconds = self._seconds, {}
+        preview = view.place.rays is not None
+        before, now = self._seconds.get(preview, {}), {}
         for part, seconds in view.seconds.items():
             units = self._units(part, view.place)
             known = [item for item in before.get(part, {}).items() if item[0] != units]
-            self._seconds[part] = dict([*known[-1:], (units, seconds)])
+            now[part] = dict([*known[-1:], (units, seconds)])
+        self._seconds[preview] = now
 
     def preview(self, place: Place) -> Place:
         """The finest that takes at most `MOVING` by what the last ones took; else the coarsest."""
@@ -123,9 +126,9 @@ class Pace:
         return next((each for each in finer if self._expected(each) <= MOVING), coarsest)
 
     def _ladder(self, whole: Place) -> Iterator[Place]:
-        """From the whole picture down: fewer rays first, then fewer pixels."""
+        """From the whole picture down: without its edges, then fewer rays, then fewer pixels."""
         yield whole
-        halved = (self._rays >> times for times in range(1, self._rays.bit_length()))
+        halved = (self._rays >> times for times in range(self._rays.bit_length()))
         fewer: list[int | None] = [rays for rays in halved if rays > FEWEST_RAYS]
         if self._rays > FEWEST_RAYS:
             fewer.append(FEWEST_RAYS)
@@ -136,7 +139,9 @@ class Pace:
 
     def _expected(self, place: Place) -> float:
         """Seconds: see `_at`."""
-        return sum(_at(self._units(part, place), known) for part, known in self._seconds.items())
+        preview = place.rays is not None
+        parts = self._seconds.get(preview) or self._seconds[not preview]
+        return sum(_at(self._units(part, place), known) for part, known in parts.items())
 
     def _units(self, part: str, place: Place) -> int:
         """Rays of the buffers, pixels of all else."""

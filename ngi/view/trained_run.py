@@ -35,7 +35,7 @@ class TrainedRun(OpenedRun):
     precision: as Lightning names that of training, which is that of `predict` too where the
         machine has units for it
     samples: what the network was trained on, which says what it is given
-    image: its `render`, as a tuple, recorded as CUDA graphs where the run's steps were
+    image: `Samples.render` of it, as a tuple, recorded as CUDA graphs where the run's steps were
     """
 
     step: int
@@ -45,10 +45,13 @@ class TrainedRun(OpenedRun):
     image: Function
 
     @classmethod
-    def open(cls, folder: Path, *, scene_path: Path | str | None = None) -> TrainedRun:
+    def open(
+        cls, folder: Path, *, scene_path: Path | str | None = None, supersampled_edges: bool = False
+    ) -> TrainedRun:
         """Loads a finished, interrupted or running run; nothing of it is changed or executed.
 
         scene_path: of a scene in the authors' format; others are known by name.
+        supersampled_edges: of its pictures, which otherwise are as the run's evaluations.
 
         Raises FileNotFoundError where this is no run's folder or it has no checkpoint yet, and
         ValueError for a damaged one, for a scene that is unknown or has changed since, and for a
@@ -57,7 +60,7 @@ class TrainedRun(OpenedRun):
         with settings_of(folder) as settings:
             checkpoint = newest_checkpoint(folder, settings)
             run = opened(folder, settings, scene_path)
-            samples = make_samples(settings, run["renderer"])
+            samples = make_samples(settings, run["renderer"], supersampled_edges=supersampled_edges)
             make = partial(made_by(settings, "model"), **plain(settings["model"]))
             network = network_of(samples, make)
             network.load_state_dict(trained_weights(checkpoint["state_dict"]))
@@ -69,14 +72,17 @@ class TrainedRun(OpenedRun):
                 precision=settings["trainer"]["precision"],
                 samples=samples,
                 network=network,
-                image=_image(network, recorded=settings["trainer"]["_target_"] == RECORDS),
+                image=_image(network, samples, recorded=settings["trainer"]["_target_"] == RECORDS),
             )
 
-    def predict(self, buffers: Tensor, scene_vector: Tensor) -> Tensor:
-        """Buffers [H, W, C] and v [D] in [0, 1] to log1p of linear RGB [H, W, 3], on the CPU."""
+    def predict(self, buffers: Tensor, scene_vector: Tensor, *, preview: bool = False) -> Tensor:
+        """Buffers [H, W, C] and v [D] in [0, 1] to log1p of linear RGB [H, W, 3], on the CPU.
+
+        preview: see `Samples.test_inputs`
+        """
         device = next(self.network.parameters()).device
         dtype = shown_in(self.precision, device.type)
-        inputs = self.samples.test_inputs(scene_vector, resolution=len(buffers))
+        inputs = self.samples.test_inputs(scene_vector, buffers, preview=preview)
         on_device = (tensor.to(device) for tensor in (buffers, *inputs))
         with torch.autocast(device.type, torch.bfloat16, enabled=dtype == torch.bfloat16):
             output: Tensor = self.image(*on_device)[0]
@@ -88,9 +94,9 @@ class TrainedRun(OpenedRun):
         return torch.expm1(self.predict(buffers, scene_vector))
 
 
-def _image(network: nn.Module, *, recorded: bool) -> Function:
+def _image(network: nn.Module, samples: Samples, *, recorded: bool) -> Function:
     def rendered(*inputs: Tensor) -> tuple[Tensor]:
-        return (network.render(*inputs),)  # type: ignore[operator]
+        return (samples.render(network, *inputs),)
 
     return Captured(rendered, module=network, name="images") if recorded else rendered
 

@@ -44,6 +44,9 @@ class VideoOptions:
     frames_per_second: int = option("of the video", 24)
     resolution: int = option("pixels a side", 256)
     exposure: float = option("stops", 0.0)
+    supersampled_edges: bool = option(
+        "ask networks four times a pixel at edges: less error, longer frames", False
+    )
     scene: str | None = option("of a run of the authors' files: their folder", None)
 
 
@@ -109,7 +112,9 @@ def _film(options: VideoOptions, stack: ExitStack) -> Film:
     for folder in map(Path, (options.run, *(options.beside or ()))):
         if folder.resolve() in (run.folder.resolve() for run in runs):
             raise ValueError(f"beside: {folder} is there already")
-        run = open_run(folder, scene_path=options.scene)
+        run = open_run(
+            folder, scene_path=options.scene, supersampled_edges=options.supersampled_edges
+        )
         stack.enter_context(closing(run.renderer))
         first = (runs or [run])[0]
         if (run.renderer.scene_hash, run.renderer.dimensions) != (

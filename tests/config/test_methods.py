@@ -23,7 +23,10 @@ IN_A_CLAIM = (
     "ours_no_preconditioning",
 )
 """Ours without what a claim of the paper is about."""
-OURS = ("ours", "ours_uniform", "ours_predicted", "ours_eager", *EXPLORING, *IN_A_CLAIM)
+OURS = (
+    *("ours", "ours_uniform", "ours_predicted", "ours_eager", "ours_supersampled"),
+    *(*EXPLORING, *IN_A_CLAIM),
+)
 LIGHT = ["specular", "direct and caustics"]
 METHODS = {  # sampler, resolution, model, what the renderer traces into the buffers
     "active_exploration": ("mcmc_loss_step", "growing", PRECONDITIONED, []),
@@ -45,6 +48,7 @@ METHODS = {  # sampler, resolution, model, what the renderer traces into the buf
     "ours_uniform": ("uniform", "constant", "encoded_generator", LIGHT),
     "ours_predicted": ("predicted_loss", "constant", "encoded_generator", LIGHT),
     "ours_eager": ("predicted_loss_eager", "constant", "encoded_generator", LIGHT),
+    "ours_supersampled": ("sobol", "constant", "encoded_generator", LIGHT),
     **{
         method: (sampler, "constant", "encoded_generator", LIGHT)
         for method, sampler in EXPLORING.items()
@@ -126,6 +130,13 @@ def test_ours_trains_on_images_as_large_as_those_that_are_shown() -> None:
         config = composed("method=ours", f"budget={budget}")
         schedule = instantiate(config.resolution)
         assert [schedule.resolution(step) for step in (0, 10**6)] == [shown, shown]
+
+
+def test_supersampled_edges_are_all_that_makes_ours_supersampled() -> None:
+    ours, finer = (composed("budget=small", f"method={m}") for m in ("ours", "ours_supersampled"))
+    assert finer.data == {**ours.data, "supersampled_edges": True}
+    for part in set(ours) - {"data", "label", "hydra"}:
+        assert finer[part] == ours[part], part
 
 
 def test_patches_are_the_cleaner_the_longer_a_budget_is() -> None:

@@ -36,7 +36,7 @@ def evaluator(renderer, protocol, tmp_path) -> Evaluator:
     )
 
 
-def v_alone(scene_vector: torch.Tensor, *, resolution: int) -> tuple[torch.Tensor]:  # noqa: ARG001
+def v_alone(scene_vector: torch.Tensor, buffers: torch.Tensor) -> tuple[torch.Tensor]:  # noqa: ARG001
     return (scene_vector,)
 
 
@@ -310,8 +310,8 @@ def test_what_a_frame_takes_is_told_by_part_and_rendered_once(
     now, asked = [0.0], []
     monkeypatch.setattr("ngi.evaluate.evaluator.perf_counter", lambda: now[0])
 
-    def observations(v: torch.Tensor, *, resolution: int) -> tuple[torch.Tensor, ...]:
-        asked.append((v, resolution))
+    def observations(v: torch.Tensor, buffers: torch.Tensor) -> tuple[torch.Tensor, ...]:
+        asked.append((v, buffers))
         now[0] += 2.0
         return v, torch.zeros(3)
 
@@ -331,4 +331,6 @@ def test_what_a_frame_takes_is_told_by_part_and_rendered_once(
         seconds = evaluator.evaluate(predict).result()["frame_seconds"]
         assert seconds == {"buffers": 0.0, "inputs": 2.0, "network": 0.5}
     assert len(asked) == 10 + protocol.low_discrepancy_frames
-    assert {resolution for _, resolution in asked} == {protocol.resolution}
+    for v, buffers in asked:
+        expected = renderer.image_buffers(v, resolution=protocol.resolution)
+        assert torch.equal(buffers, expected)

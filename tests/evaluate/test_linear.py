@@ -70,7 +70,7 @@ def evaluation(renderer, protocol, tmp_path: Path) -> Evaluation:
     """Of a prediction that is off by a fifth, and NaN in one pixel of the uniform set."""
     evaluator = Evaluator(
         renderer=renderer,
-        test_inputs=lambda v, resolution: (v,),  # noqa: ARG005
+        test_inputs=lambda v, buffers: (v,),  # noqa: ARG005
         protocol=protocol,
         cache=ReferenceCache(tmp_path / "cache"),
         lpips=Lpips(weights=None),

@@ -93,7 +93,7 @@ def test_what_only_places_the_camera_is_left_out() -> None:
     assert samples.dimensions == SCENE_VARIABLES + 2  # the sampler still draws all of them
     assert samples.network_arguments["scene_dimensions"] == SCENE_VARIABLES
     assert torch.equal(seen[1], v[:SCENE_VARIABLES])
-    assert torch.equal(samples.test_inputs(v, resolution=64)[0], v[:SCENE_VARIABLES])
+    assert torch.equal(samples.test_inputs(v, torch.zeros(64, 64, 1))[0], v[:SCENE_VARIABLES])
     assert buffers is patches.buffers
 
 
@@ -124,4 +124,4 @@ def test_the_paper_gives_all_of_v() -> None:
     samples = PatchSamples(renderer=MovingCamera(patch_size=16))
     v = torch.rand(SCENE_VARIABLES + 2)
     assert samples.network_arguments["scene_dimensions"] == SCENE_VARIABLES + 2
-    assert torch.equal(samples.test_inputs(v, resolution=64)[0], v)
+    assert torch.equal(samples.test_inputs(v, torch.zeros(64, 64, 1))[0], v)

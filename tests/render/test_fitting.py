@@ -12,7 +12,7 @@ from ngi.machine.backend import dr, llvm_problem
 from ngi.render import jit_tracer
 from ngi.render.fitting import FittingTracer
 from ngi.render.mitsuba_renderer import MitsubaRenderer
-from ngi.render.tracing import Window
+from ngi.render.tracing import PixelList, Window
 from ngi.scene import read_scene
 
 NO_MEMORY = "jit_malloc(): out of memory! Could not allocate 123 bytes (backend=CUDA, shared=0)."
@@ -40,6 +40,9 @@ class SmallTracer:
         return lambda: (noise.mean(dim=2) + rows(window)).float()
 
     def buffers(self, window, *, samples):
+        if isinstance(window, PixelList):
+            self._check(len(window.numbers) * samples)
+            return lambda: window.numbers[:, None].expand(-1, 3).float()
         self._check(window.width * window.height * samples)
         return lambda: rows(window).expand(-1, window.width, 3).float()
 
@@ -58,6 +61,9 @@ def rows(window: Window):
 WINDOW = Window(3, 5, 6, 7, 40)
 
 
+LIST = PixelList(torch.tensor([4, 1, 9, 9, 30]), 6)
+
+
 def fitting(room, **options):
     inner = SmallTracer(room, **options)
     return inner, FittingTracer(inner, free=lambda: None)
@@ -68,6 +74,21 @@ def test_what_fits_is_left_alone() -> None:
     expected = inner.radiance(WINDOW, samples=50, seed=1)()
     assert torch.equal(tracer.radiance(WINDOW, samples=50, seed=1)(), expected)
     assert (tracer.split, inner.launched) == (0, [2100, 2100])
+
+
+@pytest.mark.parametrize("room", [10, 9, 4, 2])
+def test_parts_make_the_whole_list(room) -> None:
+    inner, tracer = fitting(room)
+    expected = LIST.numbers[:, None].expand(-1, 3).float()
+    assert torch.equal(tracer.buffers(LIST, samples=2)(), expected)
+    assert sum(inner.launched) == 10
+    assert max(inner.launched) <= room
+
+
+def test_a_pixel_that_does_not_fit_is_said() -> None:
+    _, tracer = fitting(1)
+    with pytest.raises(RuntimeError, match="not even 1 pixels"):
+        tracer.buffers(LIST, samples=2)
 
 
 @pytest.mark.parametrize("room", [1500, 300, 42, 41, 20, 6])

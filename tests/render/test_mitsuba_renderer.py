@@ -59,6 +59,29 @@ def test_scalar_and_llvm_agree(load_box) -> None:
     assert different.float().mean() < 0.01  # rays that meet an edge
 
 
+PIXELS = torch.tensor([3, 40 * 48 + 7, 48 * 48 - 1, 3, 20 * 48 + 33])
+"""Of an image of 48 x 48; one twice."""
+
+
+def test_listed_pixels_are_those_of_the_image(renderer, monkeypatch) -> None:
+    image = renderer.image_buffers(V, resolution=48).flatten(0, 1)
+    listed = renderer.pixel_buffers(V, PIXELS, resolution=48)
+    torch.testing.assert_close(listed, image[PIXELS], atol=1e-5, rtol=0)
+    assert listed[:, :3].std(dim=0).max() > 0.01
+    monkeypatch.setattr("ngi.render.mitsuba_renderer.PATHS_PER_LAUNCH", 2)
+    torch.testing.assert_close(renderer.pixel_buffers(V, PIXELS, resolution=48), listed)
+
+
+def test_listed_pixels_follow_v_and_their_number(load_box) -> None:
+    """Dr.Jit replays what it recorded of another v, and of other lists."""
+    renderer = load_box("llvm", buffer_samples=4, patch_size=16)
+    for v in (V, V.flip(0), V):
+        for pixels in (PIXELS, PIXELS[:2], PIXELS.flip(0)):
+            image = renderer.image_buffers(v, resolution=48).flatten(0, 1)
+            listed = renderer.pixel_buffers(v, pixels, resolution=48)
+            torch.testing.assert_close(listed, image[pixels], atol=1e-5, rtol=0)
+
+
 def test_patch_is_a_crop_of_the_image(renderer) -> None:
     position = torch.tensor([[0.37, 0.81]])
     x, y = 12, 26  # floor(0.37 * 33), floor(0.81 * 33)

@@ -64,6 +64,11 @@ def test_processes_give_the_same(two, here) -> None:
         two.image_buffers(v, resolution=9),
         here.image_buffers(v, resolution=9),
     )
+    pixels = torch.tensor([80, 3])
+    assert torch.equal(
+        two.pixel_buffers(v, pixels, resolution=9),
+        two.image_buffers(v, resolution=9).flatten(0, 1)[pixels],
+    )
     assert torch.equal(
         two.render_image(v, resolution=9, samples_per_pixel=2, seed=1),
         here.render_image(v, resolution=9, samples_per_pixel=2, seed=1),

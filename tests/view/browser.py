@@ -79,7 +79,7 @@ def subject() -> Subject:
     )  # fmt: skip
 
 
-def coloured(buffers: Tensor, v: Tensor) -> Tensor:
+def coloured(buffers: Tensor, v: Tensor, *, preview: bool) -> Tensor:  # noqa: ARG001
     return buffers[..., :3] * v[0]
 
 

@@ -13,14 +13,19 @@ RAYS = 16
 WHOLE = Place((0.5,), 256)
 
 
-def machine(*, ray: float, pixel: float, fixed: float = 0.0) -> Callable[[Place], SceneView]:
-    """Shows a place in so many seconds per ray of the buffers and pixel of the network."""
+def machine(
+    *, ray: float, pixel: float, fixed: float = 0.0, whole: float = 1.0
+) -> Callable[[Place], SceneView]:
+    """Shows a place in so many seconds per ray of the buffers and pixel of the network.
+
+    whole: by how much the network's time is longer of whole pictures, whose edges it looks at again
+    """
 
     def show(place: Place) -> SceneView:
         pixels = place.resolution**2
         seconds = {
             "buffers": fixed + ray * pixels * (place.rays or RAYS),
-            "network": pixel * pixels,
+            "network": pixel * pixels * (whole if place.rays is None else 1),
         }
         renderer = AnalyticRenderer(dimensions=2, patch_size=4)
         return SceneView(place, renderer, lambda buffers, _: buffers, seconds=seconds)
@@ -37,10 +42,11 @@ def settled(show: Callable[[Place], SceneView], whole: Place = WHOLE) -> tuple[P
     return view.place, sum(view.seconds.values())
 
 
+@pytest.mark.parametrize("whole", [1.0, 3.0])
 @pytest.mark.parametrize("fixed", [0.0, 0.015])
 @pytest.mark.parametrize("ray", [1e-8, 2e-8, 5e-8, 1e-7, 2e-7, 4e-7])
-def test_the_finest_that_is_quick_enough(ray: float, fixed: float) -> None:
-    show = machine(ray=ray, pixel=2e-7, fixed=fixed)
+def test_the_finest_that_is_quick_enough(ray: float, fixed: float, whole: float) -> None:
+    show = machine(ray=ray, pixel=2e-7, fixed=fixed, whole=whole)
     place, seconds = settled(show)
     assert seconds <= MOVING
     rays = place.rays or RAYS
@@ -51,6 +57,15 @@ def test_the_finest_that_is_quick_enough(ray: float, fixed: float) -> None:
 
 def test_a_quick_machine_shows_the_whole_picture_at_once() -> None:
     assert settled(machine(ray=1e-9, pixel=1e-9))[0] == WHOLE
+
+
+def test_a_whole_picture_that_turned_out_slow_is_no_preview_again() -> None:
+    show, pace = machine(ray=1e-8, pixel=2e-7, whole=20.0), Pace(RAYS)
+    pace.measured(show(WHOLE))
+    for _ in range(5):
+        preview = pace.preview(WHOLE)
+        assert preview.rays is not None
+        pace.measured(show(preview))
 
 
 def test_rays_are_given_up_before_pixels() -> None:

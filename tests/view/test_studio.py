@@ -19,7 +19,7 @@ from ngi.view.studio import KEPT, Shown, Studio
 V = (0.2, 0.5, 0.8)
 
 
-def predict(buffers: Tensor, scene_vector: Tensor) -> Tensor:
+def predict(buffers: Tensor, scene_vector: Tensor, *, preview: bool = False) -> Tensor:  # noqa: ARG001
     return torch.log1p(buffers[..., :3].abs() * (1 + scene_vector[0]))
 
 
@@ -150,7 +150,7 @@ def test_no_backlog_of_pictures_while_a_slider_moves(monkeypatch: pytest.MonkeyP
 def test_a_network_that_has_learnt_is_shown_again() -> None:
     factor = [1.0]
     pictures: list[Shown] = []
-    studio = Studio(renderer=renderer(), predict=lambda b, v: predict(b, v) * factor[0])
+    studio = Studio(renderer=renderer(), predict=lambda b, v, **_: predict(b, v) * factor[0])
     studio.open("a", Wish(Place(V, 32), Screen()), pictures.append, fail)
     studio.work(wait=0)
     factor[0] = 0.5

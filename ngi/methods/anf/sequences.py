@@ -88,8 +88,15 @@ class Sequences(Samples):
         )
         return (patches.buffers, noisy, sources), target
 
-    def test_inputs(self, scene_vector: Tensor, *, resolution: int) -> tuple[Tensor, ...]:
+    def test_inputs(
+        self,
+        scene_vector: Tensor,
+        buffers: Tensor,
+        *,
+        preview: bool = False,  # noqa: ARG002
+    ) -> tuple[Tensor, ...]:
         """The arguments of `ngi.methods.anf.AffinityDenoiser.render`."""
+        resolution = len(buffers)
         generator = torch.Generator().manual_seed(TEST_SEED)
         back = torch.rand(len(scene_vector), generator=generator)
         path = self.path(torch.cat([scene_vector, back])[None]).flip(1)[0]
@@ -97,16 +104,16 @@ class Sequences(Samples):
             torch.log1p(_finite(self._noisy_frame(v, resolution, seed=derive_seed(TEST_SEED, t))))
             for t, v in enumerate(path)
         ]
-        buffers = torch.stack(
+        of_path = torch.stack(
             [self._renderer.image_buffers(v, resolution=resolution).cpu() for v in path]
         )
         sources = self._sources(
-            buffers[None],
+            of_path[None],
             path[None],
             corner=torch.zeros(1, 2, dtype=torch.int64),
             resolution=torch.tensor([resolution]),
         )
-        return torch.stack(noisy), buffers[:-1], sources[0]
+        return torch.stack(noisy), of_path[:-1], sources[0]
 
     def path(self, states: Tensor) -> Tensor:
         """States without patch position [n, dimensions] to v of every frame [n, frames, D]."""

@@ -94,7 +94,13 @@ class ObservationSets(Samples):
         query = patches.buffers[:, 0], cameras[:, 0]
         return (*query, images[:, 1:], cameras[:, 1:]), patches.log_radiance[:, 0]
 
-    def test_inputs(self, scene_vector: Tensor, *, resolution: int) -> tuple[Tensor, ...]:  # noqa: ARG002
+    def test_inputs(
+        self,
+        scene_vector: Tensor,
+        buffers: Tensor,  # noqa: ARG002
+        *,
+        preview: bool = False,  # noqa: ARG002
+    ) -> tuple[Tensor, ...]:
         """The observations keep the resolution of training."""
         observations, components = self._shape
         engine = SobolEngine(max(components, 1), scramble=True, seed=TEST_SEED)

@@ -7,15 +7,24 @@ from itertools import cycle
 import torch
 from torch import Tensor, nn
 
+from ngi.learn.samples import image_of
 from ngi.machine.timing import in_turn
 
 
-def show(network: nn.Module, buffers: Tensor, v: Tensor, precision: torch.dtype) -> Tensor:
-    """The network's image, [H, W, 3] on the CPU."""
+def show(
+    network: nn.Module,
+    *inputs: Tensor,
+    precision: torch.dtype,
+    render: Callable[..., Tensor] = image_of,
+) -> Tensor:
+    """The network's image, [H, W, 3] on the CPU.
+
+    inputs, render: buffers and `Samples.test_inputs`, and `Samples.render`
+    """
     device = next(network.parameters()).device
+    on_device = (tensor.to(device) for tensor in inputs)
     with torch.autocast(device.type, torch.bfloat16, enabled=precision == torch.bfloat16):
-        image: Tensor = network.render(buffers.to(device), v.to(device))  # type: ignore[operator]
-    return image.cpu()
+        return render(network, *on_device).cpu()
 
 
 MOST_SAMPLES = 2**16

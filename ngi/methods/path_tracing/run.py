@@ -125,8 +125,8 @@ class _Frames:
         noisy = tracing.trace(renderer.hard_frames()[0], resolution=resolution)
 
         def predict(v: Tensor) -> Tensor:
-            (seen,) = samples.test_inputs(v, resolution=resolution)
-            return show(network, buffers, seen, precision)
+            inputs = samples.test_inputs(v, buffers)
+            return show(network, buffers, *inputs, precision=precision, render=samples.render)
 
         self._network: Frame = predict
         self._denoise: Frame = lambda _: tracing.denoise(noisy, buffers)

@@ -82,9 +82,9 @@ class PathTracing:
         buffers = self.renderer.image_buffers(scene_vector, resolution=resolution)
         return self.denoise(self.trace(scene_vector, resolution=resolution), buffers.cpu())
 
-    def test_inputs(self, scene_vector: Tensor, *, resolution: int) -> tuple[Tensor, ...]:
+    def test_inputs(self, scene_vector: Tensor, buffers: Tensor) -> tuple[Tensor, ...]:
         """What an `ngi.evaluate.Evaluator` gives to `predict` beside buffers: the next frame."""
-        return (self.trace(scene_vector, resolution=resolution),)
+        return (self.trace(scene_vector, resolution=len(buffers)),)
 
     def predict(self, buffers: Tensor, radiance: Tensor) -> Tensor:
         """log1p of a frame, denoised."""

@@ -71,10 +71,11 @@ class Ours:
         precision = dtype_of(fast_precision())
         return cls(renderer, samples, network, size, precision)
 
-    def predict(self, buffers: Tensor, v: Tensor) -> Tensor:
-        """[H, W, 3] radiance, of buffers [H, W, C] and v [D]."""
-        (seen,) = self.samples.test_inputs(v, resolution=len(buffers))
-        return show(self.network, buffers, seen, self.precision)
+    def predict(self, buffers: Tensor, v: Tensor, *, preview: bool = False) -> Tensor:
+        """[H, W, 3] radiance, of buffers [H, W, C] and v [D]; preview: without finer edges."""
+        inputs = self.samples.test_inputs(v, buffers, preview=preview)
+        render, precision = self.samples.render, self.precision
+        return show(self.network, buffers, *inputs, precision=precision, render=render)
 
 
 @dataclass(frozen=True)

@@ -75,7 +75,8 @@ def _frames(
 
     functions: list[Callable[[], object]] = [render_buffers]
     for precision in precisions().values():
-        functions += [partial(show, network, buffers, v, precision), products(network, precision)]
+        shown = partial(show, network, buffers, v, precision=precision)
+        functions += [shown, products(network, precision)]
     title = f"inference, {resolution} pixels"
     of_buffers, *others = in_turn(repeats, title, *functions, seconds=seconds)
     size = f"{resolution} × {resolution}"

@@ -44,7 +44,10 @@ def viewer(scene: Scene, *, seconds: float) -> list[Figure]:
 
 def _while_moving(name: str, component: int, made: Ours, *, seconds: float) -> list[Figure]:
     renderer = made.renderer
-    studio = Studio(renderer=renderer, predict=lambda *given: made.predict(*given).float())
+    studio = Studio(
+        renderer=renderer,
+        predict=lambda *given, preview: made.predict(*given, preview=preview).float(),
+    )
     first = renderer.hard_frames()[0].tolist()
 
     def wish(moves: int) -> Wish:

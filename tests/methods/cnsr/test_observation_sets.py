@@ -64,7 +64,7 @@ def test_images_of_one_view_have_noise_of_their_own() -> None:
         assert torch.equal(made.buffers[0, a], made.buffers[0, 0])
         for b in range(a):
             assert not torch.allclose(images[a], images[b])
-    _, observations, _ = samples.test_inputs(torch.full((3,), 0.5), resolution=24)
+    _, observations, _ = samples.test_inputs(torch.full((3,), 0.5), torch.zeros(24, 24, 1))
     assert not torch.allclose(observations[0], observations[1])
 
 
@@ -110,7 +110,7 @@ def test_any_image_of_a_stored_set_becomes_the_query(samples) -> None:
 def test_a_test_frame_is_observed_in_its_own_scene_always_from_the_same_cameras(samples) -> None:
     first, second = torch.tensor([0.2, 0.7, 0.1, 0.9]), torch.tensor([0.6, 0.1, 0.5, 0.5])
     clean = ObservationSets(renderer=MovingCamera(patch_size=SIZE), observations=OBSERVATIONS)
-    frames = {v: clean.test_inputs(v, resolution=48) for v in (first, second)}
+    frames = {v: clean.test_inputs(v, torch.zeros(48, 48, 1)) for v in (first, second)}
     for v, (camera, observations, cameras) in frames.items():
         assert torch.equal(camera, MovingCamera(patch_size=SIZE).cameras(v[None])[0])
         for observation, seen_from in zip(observations, cameras, strict=True):
@@ -122,8 +122,8 @@ def test_a_test_frame_is_observed_in_its_own_scene_always_from_the_same_cameras(
             torch.testing.assert_close(observation, image)
     assert torch.equal(frames[first][2], frames[second][2])
     assert len(frames[first][2].unique(dim=0)) == OBSERVATIONS
-    again = samples.test_inputs(first, resolution=48)
-    for a, b in zip(again, samples.test_inputs(first, resolution=96), strict=True):
+    again = samples.test_inputs(first, torch.zeros(48, 48, 1))
+    for a, b in zip(again, samples.test_inputs(first, torch.zeros(96, 96, 1)), strict=True):
         assert torch.equal(a, b)
 
 

@@ -155,7 +155,9 @@ def test_a_run_can_be_looked_at_and_not_exported(tmp_path: Path) -> None:
     assert status == 0, output
     opened = TrainedRun.open(tmp_path / "run")
     v = torch.tensor([0.2, 0.4, 0.6])
-    inputs = ObservationSets(renderer=opened.renderer, observations=3).test_inputs(v, resolution=24)
+    inputs = ObservationSets(renderer=opened.renderer, observations=3).test_inputs(
+        v, torch.zeros(24, 24, 1)
+    )
     buffers = opened.renderer.image_buffers(v, resolution=24)
     expected = torch.expm1(opened.network.render(buffers, *inputs))
     torch.testing.assert_close(opened.radiance(v, resolution=24), expected)

@@ -6,9 +6,9 @@ import re
 import shutil
 from math import pi
 from pathlib import Path
+from typing import Any
 
 import pytest
-import torch
 from hydra.errors import InstantiationException
 from torch import Tensor, nn
 
@@ -95,9 +95,9 @@ def test_the_network_beside_it_is_the_one_that_would_be_trained(
     """Here without the first component of v, which the renderer says places the camera."""
     given = []
 
-    def seen(network: nn.Module, buffers: Tensor, v: Tensor, precision: torch.dtype) -> Tensor:
+    def seen(network: nn.Module, buffers: Tensor, v: Tensor, **how: Any) -> Tensor:
         given.append(v)
-        return show(network, buffers, v, precision)
+        return show(network, buffers, v, **how)
 
     monkeypatch.setattr(AnalyticRenderer, "camera_part", slice(0, 1), raising=False)
     monkeypatch.setattr("ngi.methods.path_tracing.run.show", seen)

@@ -88,7 +88,7 @@ def test_the_denoiser_gets_linear_radiance_albedo_and_normal() -> None:
 
     tracing = path_tracing(denoiser=twice)
     buffers, _ = tracing.renderer.whole_image(V, SIZE)  # type: ignore[attr-defined]
-    predicted = torch.expm1(tracing.predict(buffers, *tracing.test_inputs(V, resolution=SIZE)))
+    predicted = torch.expm1(tracing.predict(buffers, *tracing.test_inputs(V, buffers)))
     torch.testing.assert_close(predicted, 2 * seen["radiance"])
     assert torch.equal(seen["radiance"], path_tracing().trace(V, resolution=SIZE))
     assert torch.equal(seen["albedo"], buffers[..., tracing.renderer.layout.slice("albedo")])

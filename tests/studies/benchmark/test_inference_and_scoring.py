@@ -50,7 +50,7 @@ def test_the_picture_is_the_networks_in_the_precision_asked_for() -> None:
     with torch.no_grad():
         exact = network(buffers[None], v[None])[0]
     errors = {
-        name: float((inference.show(network, buffers, v, precision) - exact).abs().max())
+        name: float((inference.show(network, buffers, v, precision=precision) - exact).abs().max())
         for name, precision in {"bf16": torch.bfloat16, "fp32": torch.float32}.items()
     }
     assert errors["fp32"] < 1e-6 < errors["bf16"] < 0.01
