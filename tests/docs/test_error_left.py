@@ -13,7 +13,7 @@ SCENES = ("living-room", "bathroom")
 
 
 def shown(changes: pd.Series) -> str:
-    return ", ".join(map(tenths, changes - 1)).replace("−0.0", "0.0")
+    return ", ".join(map(tenths, changes - 1)).replace("−0.0", "0.0").replace("+0.0", "0.0")
 
 
 def test_what_emission_and_more_questions_at_edges_are_worth() -> None:
@@ -42,3 +42,40 @@ def test_which_pixels_hold_the_error() -> None:
             each = [100 * shares.loc[(frames, kind), column] for frames in ("hard", "uniform")]
             digits = 1 if max(each) < 0.5 else 0
             assert cell == " / ".join(f"{share:.{digits}f}" for share in each) + " %"
+
+
+SUPERSAMPLED = "Supersampled edges"
+SHOWN = ("error", "mape", "dssim", "mae", "lpips", "tail")
+
+
+def test_what_supersampled_edges_are_worth() -> None:
+    runs = pd.read_csv(root() / "docs/learner/supersampled.csv")
+    of = runs.set_index(["supersampled_edges", "scene"])
+    changes = of.loc[True] / of.loc[False]
+    rows = iter(rows_of(PAGE, SUPERSAMPLED)[2:])
+    for scene in ("living-room", "sphere-caustic", "veach-egg"):
+        columns = [[f"{frames}_{metric}" for frames in ("hard", "uniform")] for metric in SHOWN]
+        expected = [" / ".join(shown(changes.loc[scene, [c]]) for c in pair) for pair in columns]
+        assert next(rows) == expected
+
+
+def test_which_edges_and_how_many_rays_a_quarter_needs() -> None:
+    runs = pd.read_csv(root() / "docs/learner/quarters.csv")
+    masks = runs.sort_values("share").query("scene == 'living-room'")["edges"].unique()
+    runs = runs.set_index(["edges", "rays_per_quarter", "scene"])
+    columns = [
+        f"{frames}_{of}_change_percent"
+        for frames in ("hard", "uniform")
+        for of in ("error", "tail")
+    ]
+    rows = iter(rows_of(PAGE, SUPERSAMPLED)[7:])
+    for edges, rays in [*((mask, 16) for mask in masks), (masks[-1], 8), (masks[-1], 4)]:
+        row = next(rows)
+        assert row[0] == str(rays)
+        for cell, scene in zip(row[1:], (*SCENES, "sphere-caustic"), strict=True):
+            run = runs.loc[(edges, rays, scene)]
+            hard, hard_tail, uniform, uniform_tail = (
+                tenths(run[column] / 100).replace("−0.0", "0.0") for column in columns
+            )
+            expected = f"{hard}, {hard_tail} / {uniform}, {uniform_tail}".replace("+0.0", "0.0")
+            assert cell == f"{100 * run.share:.0f} %: {expected}"
