@@ -108,7 +108,7 @@ class PatchSamples(Samples):
         if not 0 <= traced_share <= 1:
             raise ValueError(f"data.traced_share is {traced_share}; expected 0 to 1")
         self._renderer = renderer
-        self._supersampled_edges = supersampled_edges
+        self.supersampled_edges = supersampled_edges
         self.layout = renderer.layout
         self._denoise = None
         if denoiser is not None:
@@ -141,7 +141,7 @@ class PatchSamples(Samples):
     ) -> tuple[Tensor, ...]:
         """V [D], or what is seen of it, and of a supersampled image `quarters`."""
         seen = self._of(scene_vector)
-        if preview or not self._supersampled_edges:
+        if preview or not self.supersampled_edges:
             return (seen,)
         return seen, *quarters(scene_vector, buffers, self._renderer)
 

@@ -109,7 +109,7 @@ def _shown_difference(run: TrainedRun, frame: Tensor, v: Tensor) -> float:
     from ngi.view.network_file import FLOAT32, relative_difference
 
     shown, exact = (
-        replace(run, precision=precision).predict(frame, v).expm1()
+        replace(run, precision=precision).predict(frame, v, preview=True).expm1()
         for precision in (run.precision, FLOAT32)
     )
     return relative_difference(shown, exact)

@@ -14,6 +14,7 @@ import torch
 from torch import Tensor, nn
 
 from ngi.learn import PatchSamples
+from ngi.learn.supersampling import LEAST
 from ngi.machine.provenance import provenance
 from ngi.models import EncodedGenerator, PixelGenerator
 from ngi.models.known_light import EMITTER_THRESHOLD
@@ -125,6 +126,10 @@ PIXELS = (
     "but for its throughput and the environment's emission"
 )
 RADIANCE = "linear RGB in the scene's units, as the network gives it: it may be slightly negative"
+EDGES = (
+    "at edges, where a component of a buffer differs by so much within 3 x 3 pixels, the program "
+    "itself shows the mean radiance of the four quarters of a pixel, each with buffers of its own"
+)
 KNOWN_LIGHT = {
     (): "expm1(o)",
     ("emission",): "expm1(o + emission)",
@@ -166,6 +171,11 @@ def network_metadata(run: TrainedRun, precision_differs: float) -> dict[str, str
         "buffers": json.dumps(list(_buffers(run.renderer.layout))),
         "pixels": PIXELS,
         "buffer_samples": str(run.renderer.buffer_samples),
+        **(
+            {"supersampled_edges": f"{EDGES}: {json.dumps(LEAST)}"}
+            if run.samples.supersampled_edges
+            else {}
+        ),
         **(
             {}
             if run.description is None

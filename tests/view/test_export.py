@@ -1,6 +1,7 @@
 """`ngi export` on runs of closed formulas; ONNX Runtime is the independent judge."""
 
 import json
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -13,6 +14,7 @@ import pytest
 import torch
 
 from ngi.files.resources import root
+from ngi.learn.supersampling import LEAST
 from ngi.machine.precision import multiplies_bfloat16
 from ngi.models import EncodedGenerator, LinearEmissionGenerator, PixelGenerator
 from ngi.models.known_light import add_known_light
@@ -201,6 +203,23 @@ def test_a_network_of_ours_says_what_of_v_it_is_given_and_how_it_is_shown(tmp_pa
     assert bool(told_to_differ) == multiplies_bfloat16("cpu")
     stated = float(told_to_differ.split()[0]) if told_to_differ else 0
     assert difference == pytest.approx(stated, rel=0.06, abs=1e-5)  # it is told with two digits
+
+
+def test_it_says_where_the_program_shows_something_else(exported: Path, trained: Path) -> None:
+    """In the file itself, whose pixels know nothing of each other, there are no edges."""
+    folder = trained / "finer"
+    shutil.copytree(trained / "run", folder)
+    settings = json.loads((folder / "settings.json").read_text())
+    settings["data"]["supersampled_edges"] = True
+    (folder / "settings.json").write_text(json.dumps(settings))
+    assert export.main([f"run={folder}", f"out={trained / 'finer.onnx'}"]) == 0
+    told = [
+        onnxruntime.InferenceSession(file).get_modelmeta().custom_metadata_map
+        for file in (trained / "finer.onnx", exported)
+    ]
+    where = told[0].pop("supersampled_edges")
+    assert json.loads(where[where.index("{") :]) == LEAST
+    assert told[0] == told[1]
 
 
 def test_it_tells_no_path_of_this_machine(exported: Path) -> None:
