@@ -18,6 +18,7 @@ from ngi.config.configuration import register, run_settings, scene_place
 from ngi.config.hydra_program import MESSAGES, completed, fail, run_program, with_overrides
 from ngi.config.outline import only_bootstrap, outline
 from ngi.config.values import check_values
+from ngi.files.extras import install_command
 from ngi.files.resources import root
 from ngi.machine.memory import keep_freed_memory
 from ngi.machine.repeatable import make_repeatable
@@ -153,7 +154,9 @@ def _live_view(config: DictConfig, run: learn.Run) -> LiveView:
     try:
         from ngi.view.live import live_view
     except ModuleNotFoundError as error:
-        raise RuntimeError(f"viewer=true needs {error.name}: pip install -e .[viewer]") from error
+        raise RuntimeError(
+            f"viewer=true needs {error.name}: {install_command('viewer')}"
+        ) from error
     return live_view(
         run,
         scene_name=config.scene.name,

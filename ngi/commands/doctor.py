@@ -2,6 +2,7 @@
 
 import os
 import platform
+import re
 import shutil
 import subprocess
 import sys
@@ -11,6 +12,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from ngi.config.options import run_tool
+from ngi.files.extras import EXTRAS, install_command, requirements
 from ngi.machine.provenance import LIBRARIES
 from ngi.machine.size import usable_cores
 
@@ -124,6 +126,22 @@ for name, problem in problems.items():
     return Finding("Mitsuba", True, detail)
 
 
+def extras() -> Finding:
+    """Optional packages; ours does not train without its denoiser."""
+    missing = [extra for extra in EXTRAS if not _installed(extra)]
+    there = ", ".join(extra for extra in EXTRAS if extra not in missing) or "none"
+    lacking = "; ".join(f"without {extra}: no {EXTRAS[extra]}" for extra in missing)
+    detail = f"{there}; {lacking}" if lacking else there
+    return Finding("extras", not missing, detail, " && ".join(map(install_command, missing)))
+
+
+def _installed(extra: str) -> bool:
+    try:
+        return all(version(re.split("[=<>~!]", each)[0]) for each in requirements(extra))
+    except PackageNotFoundError:
+        return False
+
+
 def lpips_weights() -> Finding:
     from ngi.evaluate import Lpips
 
@@ -138,7 +156,7 @@ def lpips_weights() -> Finding:
 
 
 CHECKS: tuple[Callable[[], Finding], ...] = (
-    python, libraries, renderer, llvm, optix, torch_device, lpips_weights,
+    python, libraries, renderer, llvm, optix, torch_device, lpips_weights, extras,
 )  # fmt: skip
 
 

@@ -6,6 +6,7 @@ from typing import Protocol
 import torch
 from torch import Tensor
 
+from ngi.files.extras import install_command
 from ngi.patches import BufferLayout
 from ngi.render.protocol import RenderedPatches
 
@@ -35,7 +36,7 @@ class OpenImageDenoise:
         except ModuleNotFoundError as error:
             raise RuntimeError(
                 f"Open Image Denoise is asked for, and needs {error.name}: "
-                "pip install -e .[denoise]"
+                f"{install_command('denoise')}"
             ) from error
         self._denoise = pyoidn.denoise
 

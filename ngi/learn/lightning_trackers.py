@@ -12,6 +12,7 @@ import numpy as np
 from PIL import Image
 
 from ngi.evaluate import Comparison
+from ngi.files.extras import install_command
 from ngi.files.row_log import RowLog
 from ngi.learn.remote_tracker import Remote, group, job_type, kept_id, nested, shown_name
 
@@ -33,8 +34,8 @@ class LightningLogger(Remote):
     def _import(self) -> None:
         if find_spec(self.extra) is None:
             raise RuntimeError(
-                f"tracker={self.extra}: {self.extra} is not installed; `pip install -e "
-                f".[{self.extra}]`, or choose tracker=local"
+                f"tracker={self.extra}: {self.extra} is not installed; "
+                f"`{install_command(self.extra)}`, or choose tracker=local"
             )
 
     def _log(self, row: dict[str, float]) -> None:

@@ -9,6 +9,7 @@ from typing import Any, Self
 import torch
 from torch import Tensor
 
+from ngi.files.extras import install_command
 from ngi.render.protocol import Deferred, RenderedPatches, Renderer
 from ngi.render.tracing import check_states, patch_window
 from ngi.render.worker_pool import WorkerPool
@@ -143,7 +144,7 @@ def _starter(make: bytes, *, workers: int, cluster: str | None) -> Callable[[int
         from ngi.render.ray_workers import RayWorker, join_cluster
     except ModuleNotFoundError as error:
         raise RuntimeError(
-            f"renderer.cluster '{cluster}' needs Ray; get it with `pip install -e .[ray]`"
+            f"renderer.cluster '{cluster}' needs Ray; get it with `{install_command('ray')}`"
         ) from error
     return partial(RayWorker, share=join_cluster(cluster, workers=workers), make=make)
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ngi.config.options import option, run_tool
+from ngi.files.extras import install_command
 
 POLL = 0.5
 """Seconds to wait for something to do, after which Ctrl-C is looked at."""
@@ -39,7 +40,7 @@ def view(options: ViewOptions) -> None:
     try:
         from ngi.view.page import Page
     except ModuleNotFoundError as error:
-        raise RuntimeError(f"ngi view needs {error.name}: pip install -e .[viewer]") from error
+        raise RuntimeError(f"ngi view needs {error.name}: {install_command('viewer')}") from error
     from ngi.view.studio import Studio
     from ngi.view.subject import subject
     from ngi.view.trained_run import TrainedRun

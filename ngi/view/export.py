@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ngi.config.options import check_output, option, run_tool
+from ngi.files.extras import install_command
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -47,7 +48,7 @@ def export(options: ExportOptions) -> None:
     out = Path(options.out)
     check_output(out, SUFFIX)
     if missing := [name for name in PACKAGES if find_spec(name) is None]:
-        raise ValueError(f"{', '.join(missing)} missing: pip install -e .[export]")
+        raise ValueError(f"{', '.join(missing)} missing: {install_command('export')}")
     from ngi.files.durable import write_atomically
     from ngi.view.network_file import ImageNetwork, network_file, network_metadata
     from ngi.view.trained_run import TrainedRun

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ngi.files.durable import PARTIAL_SUFFIX
+from ngi.files.extras import install_command
 
 QUALITY = "16"
 """x264's constant rate factor: no difference to the pictures can be seen."""
@@ -26,7 +27,7 @@ def pyav() -> ModuleType:
         import av
     except ImportError as error:
         raise RuntimeError(
-            "videos need PyAV, which is missing here; get it with `pip install -e .[video]`"
+            f"videos need PyAV, which is missing here; get it with `{install_command('video')}`"
         ) from error
     module: ModuleType = av
     return module

@@ -1,7 +1,10 @@
+from importlib.metadata import PackageNotFoundError
+
 import pytest
 
 from ngi.commands import doctor
 from ngi.commands.doctor import Finding
+from ngi.files.extras import install_command
 
 
 def test_every_missing_thing_comes_with_what_brings_it() -> None:
@@ -52,3 +55,20 @@ def test_weights_that_are_named_and_not_there_are_nothing_that_set_up_mends(
     assert "/nowhere.pth" in finding.detail
     assert finding.remedy == "correct or unset NGI_LPIPS_WEIGHTS"
     assert not finding.required
+
+
+def test_an_extra_that_is_missing_says_what_is_not_to_be_had(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def no_viewer(name: str) -> str:
+        if name == "viser":
+            raise PackageNotFoundError
+        return "1.0"
+
+    monkeypatch.setattr(doctor, "version", no_viewer)
+    finding = doctor.extras()
+    assert (finding.present, finding.required) == (False, False)
+    assert finding.detail.startswith("denoise, video, export; without viewer: no ngi view")
+    assert finding.remedy == install_command("viewer")
+    monkeypatch.setattr(doctor, "version", lambda _: "1.0")
+    assert doctor.extras().present
