@@ -73,7 +73,8 @@ def test_what_an_oracle_takes_off_dear_patches_is_what_the_runs_say() -> None:
 
     shown = rows_of(page, "What comes near to it on bathroom")[2:]
     new = tables[1].query("scene == 'bathroom' and patches == 256").set_index(["choice", "seed"])
-    for row, choice in zip(shown, ("oracle", "disagreement", "forest"), strict=True):
+    ways = ("oracle", "disagreement", "forest", "predicted")
+    for row, choice in zip(shown, ways, strict=True):
         for cell, error in zip(row, ("hard_error", "hard_tail", "uniform_error"), strict=False):
             found = difference_of(new.loc["uniform", error], new.loc[choice, error])
             assert cell == as_shown(found).split(" %")[0]

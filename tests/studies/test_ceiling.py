@@ -11,8 +11,9 @@ from omegaconf import DictConfig
 from ngi.config.configuration import composed
 from ngi.explore import Importance
 from ngi.files.code_versions import code_version
-from ngi.studies.ceiling import campaign, runs
-from ngi.studies.ceiling.runs import Run, plan, true_errors
+from ngi.studies.ceiling import campaign, choices, runs
+from ngi.studies.ceiling.choices import Oracle, Predicted, true_errors
+from ngi.studies.ceiling.runs import Run, plan
 from ngi.studies.provenance import claim
 
 PROTOCOL = "evaluation.evaluator.protocol"
@@ -40,10 +41,10 @@ def configuration(folder: Path, *overrides: str) -> DictConfig:
 
 def test_every_run_of_a_small_study_is_done_once_and_repeats(tmp_path: Path) -> None:
     first = pd.read_csv(campaign.run_all(configuration(tmp_path / "a")))
-    assert list(first["choice"]) == ["uniform", "oracle", "oracle_weighted", "uniform"]
-    assert list(first["patches"]) == [16, 16, 16, 64]
+    assert list(first["choice"]) == ["uniform", "oracle", "predicted", "oracle_weighted", "uniform"]
+    assert list(first["patches"]) == [16, 16, 16, 16, 64]
     assert (first[["hard_error", "uniform_error", "hard_tail"]] > 0).all(axis=None)
-    assert first["hard_error"].nunique() == 4
+    assert first["hard_error"].nunique() == 5
     assert (first["hard_relmse"] > 0).all()  # there is no noise, and much to learn
     files = sorted((tmp_path / "a" / "runs").iterdir())
     before = [file.stat().st_mtime_ns for file in files]
@@ -171,7 +172,8 @@ class NoEvaluator:
 @pytest.fixture
 def recorded(monkeypatch: pytest.MonkeyPatch):
     """Does a run on a pool of numbers, whose true errors are these numbers."""
-    monkeypatch.setattr(runs, "chosen", lambda pool, indices: pool[indices])
+    for module in (runs, choices):
+        monkeypatch.setattr(module, "chosen", lambda pool, indices: pool[indices])
     monkeypatch.setattr(runs, "measured", lambda _: {"hard_error": 1.0})
 
     def do(choice: Importance, *, seed: int = 0) -> Recorder:
@@ -183,7 +185,7 @@ def recorded(monkeypatch: pytest.MonkeyPatch):
             training,
             pool=pool,
             truth=torch.zeros(1000),
-            choice=choice,
+            choice=Oracle(choice, torch.zeros(1000)),
             rounds=4,
             evaluator=NoEvaluator(),
         )
@@ -252,3 +254,47 @@ def test_true_errors_are_those_of_the_patches_named() -> None:
     truth = torch.tensor([0.0, 0, 0, 0, 1, 1])
     found = true_errors(Training(), pool, truth, torch.tensor([5, 2]))
     assert found.tolist() == [4, 2]
+
+
+class Disagreeing(Recorder):
+    """Whose patches are numbers; what is known of them tells their losses, or nothing."""
+
+    def __init__(self, *, tells: bool) -> None:
+        super().__init__()
+        self.tells = tells
+
+    def described(self, patches):
+        return torch.zeros(len(patches), 3)
+
+    def disagreement(self, patches):
+        return patches if self.tells else torch.zeros(len(patches))
+
+    def losses(self, patches):
+        assert not self.added or not set(self.added[-1].tolist()) & set(patches.tolist())
+        return (patches > 900).float() + 0.01
+
+
+@pytest.mark.parametrize("tells", [True, False])
+@pytest.mark.usefixtures("recorded")
+def test_predictions_find_what_was_lost_where_something_tells_of_it(tells: bool) -> None:
+    """A tenth of all numbers is lost on; of those that are drawn after the first round, a third."""
+    training = Disagreeing(tells=tells)
+    choice = Predicted(importance=Importance(uniform_share=0.0), trees=16, depth=4, smallest_leaf=1)
+    runs.do(
+        Run(patches=120, steps=4, choice="any", seed=0),
+        training,
+        pool=torch.arange(1000.0),
+        truth=torch.zeros(1000),
+        choice=choice,
+        rounds=4,
+        evaluator=NoEvaluator(),
+    )
+    later = torch.cat(training.added[1:])
+    share = (later > 900).float().mean().item()
+    assert len(set(later.tolist())) == 90
+    assert (share > 0.25) if tells else (share < 0.15)
+
+
+def test_without_averaged_weights_there_is_nothing_to_disagree_with(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="give averaging=exponential"):
+        campaign.run_all(configuration(tmp_path, "averaging=none"))

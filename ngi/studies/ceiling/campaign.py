@@ -15,13 +15,15 @@ from tqdm import tqdm
 
 from ngi.config.build import build_samples, plain
 from ngi.evaluate import Evaluator
+from ngi.explore import Importance
 from ngi.files.durable import write_atomically, write_tensors
 from ngi.learn import Samples
 from ngi.machine.memory import keep_freed_memory
 from ngi.reuse import CompactPatches
 from ngi.studies import provenance
+from ngi.studies.ceiling.choices import CHUNK, Choice, Oracle
 from ngi.studies.ceiling.pool import check_count, chosen, render_pool
-from ngi.studies.ceiling.runs import CHUNK, Run, do, measured, plan
+from ngi.studies.ceiling.runs import Run, do, measured, plan
 from ngi.studies.ceiling.training import Training
 
 TABLE, TEACHER = "ceiling.csv", "teacher.pt"
@@ -58,7 +60,7 @@ def run_all(config: DictConfig) -> Path:
                 training,
                 pool=pool,
                 truth=truth,
-                choice=instantiate(study.choices[run.choice]),
+                choice=_choice(study.choices[run.choice], truth),
                 rounds=study.rounds,
                 evaluator=evaluator,
             )
@@ -67,6 +69,12 @@ def run_all(config: DictConfig) -> Path:
     table = pd.concat([pd.read_csv(_file(folder, run)) for run in runs], ignore_index=True)
     write_atomically(folder / TABLE, table.to_csv(index=False).encode())
     return folder / TABLE
+
+
+def _choice(option: DictConfig, truth: Tensor) -> Choice:
+    """Of one run. An option that only says how values count is an oracle's."""
+    made: Choice | Importance = instantiate(option)
+    return Oracle(made, truth) if isinstance(made, Importance) else made
 
 
 def _rendered(config: DictConfig, folder: Path) -> tuple[Samples, Evaluator, CompactPatches]:

@@ -10,14 +10,11 @@ import torch
 from torch import Tensor
 
 from ngi.evaluate import METRICS, SETS, Evaluation, Evaluator
-from ngi.explore import Importance
 from ngi.learn.new_losses import worst_share
 from ngi.reuse import CompactPatches
+from ngi.studies.ceiling.choices import Choice, true_errors
 from ngi.studies.ceiling.pool import chosen
 from ngi.studies.ceiling.training import Training
-
-CHUNK = 512
-"""Candidates that the network is asked about at once."""
 
 
 class Run(NamedTuple):
@@ -64,7 +61,7 @@ def do(
     *,
     pool: CompactPatches,
     truth: Tensor,
-    choice: Importance,
+    choice: Choice,
     rounds: int,
     evaluator: Evaluator,
 ) -> dict[str, Any]:
@@ -72,7 +69,7 @@ def do(
 
     Patches come in `rounds` rounds, evenly over the steps. The first is drawn uniformly, for an
     untrained network has nothing to say, and is the same for all choices of a seed; the others by
-    the true errors of all patches not yet chosen. What the row says beside the errors of `measured`
+    `choice`, out of all patches not yet chosen. What the row says beside the errors of `measured`
     is `worst_share`, the share of these patches' error that the worst 5 % of them hold at the end;
     with the whole pool chosen, of all patches.
 
@@ -83,26 +80,19 @@ def do(
     for number in range(rounds):
         candidates = left.nonzero().flatten()
         count = _part(run.patches, number, rounds)
-        if number == 0 or choice.uniform_share == 1:
+        if number == 0 or choice.importance.uniform_share == 1:
             drawn = torch.randperm(len(candidates), generator=generator)[:count]
             weights = torch.ones(count, dtype=torch.float64)
         else:
-            errors = true_errors(training, pool, truth, candidates)
-            drawn, weights = choice.draw(errors, count, generator)
+            values = choice.values(training, pool, candidates, generator)
+            drawn, weights = choice.importance.draw(values, count, generator)
+        choice.chose(training, pool, candidates[drawn])
         training.add(chosen(pool, candidates[drawn]), weights)
         left[candidates[drawn]] = False
         training.train(_part(run.steps, number, rounds))
     rest = left.nonzero().flatten() if left.any() else torch.arange(len(pool))
     share = worst_share(true_errors(training, pool, truth, rest))
     return {**run._asdict(), **measured(evaluator.evaluate(training.predict)), "worst_share": share}
-
-
-def true_errors(
-    training: Training, pool: CompactPatches, truth: Tensor, candidates: Tensor
-) -> Tensor:
-    """[n] of the patches with these indices, under the averaged weights."""
-    parts = candidates.split(CHUNK)
-    return torch.cat([training.errors(chosen(pool, part), truth[part]) for part in parts])
 
 
 def measured(evaluation: Evaluation) -> dict[str, float]:

@@ -9,7 +9,7 @@ from typing import Any
 import torch
 from hydra.utils import instantiate
 from omegaconf import DictConfig
-from torch import Tensor
+from torch import Tensor, nn
 
 from ngi import learn
 from ngi.clock.counters import Counters
@@ -79,12 +79,38 @@ class Training:
         """
         return (self.answers(patches) - truth).abs().mean(dim=(1, 2, 3))
 
+    def losses(self, patches: Patches) -> Tensor:
+        """[n] `errors` against the traced radiance, noise included."""
+        return self.errors(patches, _sparse(patches.log_radiance.float()))
+
+    def described(self, patches: Patches) -> Tensor:
+        """[n, 2 C + D]: mean and deviation of the buffers at the pixels of `answers`, and v."""
+        (buffers, vectors), _ = self._samples.example(patches)
+        pixels = _sparse(buffers.float())
+        return torch.cat([pixels.mean((1, 2)), pixels.std((1, 2)), vectors.float()], dim=1)
+
+    def disagreement(self, patches: Patches) -> Tensor:
+        """[n] mean absolute differences of `answers` by present and by averaged weights.
+
+        Raises ValueError without averaged ones.
+        """
+        if self._module.averaged is None:
+            raise ValueError(
+                "averaging: a choice by what present and averaged weights disagree on needs such; "
+                "give averaging=exponential"
+            )
+        present = self._answers_of(self._module.network, patches)
+        return (present - self.answers(patches)).abs().mean(dim=(1, 2, 3))
+
     def answers(self, patches: Patches) -> Tensor:
         """[n, h, w, 3] log1p radiance by the averaged weights, at every fourth row and column."""
-        (buffers, vectors), _ = self._samples.example(patches.to(self._device))
         averaged = self._module.averaged
         network = self._module.network if averaged is None else averaged.module
-        sparse = buffers[:, ::PIXELS_APART, ::PIXELS_APART].contiguous()
+        return self._answers_of(network, patches)
+
+    def _answers_of(self, network: nn.Module, patches: Patches) -> Tensor:
+        (buffers, vectors), _ = self._samples.example(patches.to(self._device))
+        sparse = _sparse(buffers).contiguous()
         with torch.no_grad(), self._module.trainer.precision_plugin.forward_context():
             answer: Tensor = network(sparse, vectors)
         return answer.float().cpu()
@@ -99,6 +125,11 @@ class Training:
             precision=self._module.trainer.precision_plugin.forward_context,
         )
         self._taken += 1
+
+
+def _sparse(images: Tensor) -> Tensor:
+    """[n, H, W, k] to [n, h, w, k]."""
+    return images[:, ::PIXELS_APART, ::PIXELS_APART]
 
 
 class _Answered:

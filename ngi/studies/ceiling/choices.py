@@ -1,0 +1,114 @@
+"""What the patches of a run are chosen by: their true errors, or what a sampler can know."""
+
+# ruff: noqa: ARG002 - a choice is given more than it need look at
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import torch
+from torch import Tensor
+
+from ngi.explore import Importance
+from ngi.explore.forest import grow
+from ngi.reuse import CompactPatches
+from ngi.studies.ceiling.pool import chosen
+from ngi.studies.ceiling.training import Training
+
+CHUNK = 512
+"""Candidates that the network is asked about at once."""
+
+
+class Choice(Protocol):
+    """Of one run: candidates are drawn by `importance` of their `values`."""
+
+    importance: Importance
+
+    def values(
+        self,
+        training: Training,
+        pool: CompactPatches,
+        candidates: Tensor,
+        generator: torch.Generator,
+    ) -> Tensor:
+        """[n], at least 0, of the patches with these numbers."""
+        ...
+
+    def chose(self, training: Training, pool: CompactPatches, numbers: Tensor) -> None:
+        """These were chosen, and are not trained on yet."""
+        return
+
+
+class Oracle(Choice):
+    """By true errors, under the present averaged weights.
+
+    truth: [m, h, w, 3] log1p radiance of the pool, see `Training.answers`
+    """
+
+    def __init__(self, importance: Importance, truth: Tensor) -> None:
+        self.importance = importance
+        self._truth = truth
+
+    def values(
+        self,
+        training: Training,
+        pool: CompactPatches,
+        candidates: Tensor,
+        generator: torch.Generator,
+    ) -> Tensor:
+        return true_errors(training, pool, self._truth, candidates)
+
+
+class Predicted(Choice):
+    """By the losses that a forest predicts, through those of all chosen before as they were new.
+
+    Of a patch it knows what is there before a path is traced: v, mean and deviation of its buffers,
+    and how far present and averaged weights disagree on it.
+
+    trees, depth, smallest_leaf: see `ngi.explore.forest.grow`
+    """
+
+    def __init__(
+        self, *, importance: Importance, trees: int, depth: int, smallest_leaf: int
+    ) -> None:
+        self.importance = importance
+        self._forest = {"trees": trees, "depth": depth, "smallest_leaf": smallest_leaf}
+        self._seen: list[Tensor] = []
+        self._losses: list[Tensor] = []
+
+    def values(
+        self,
+        training: Training,
+        pool: CompactPatches,
+        candidates: Tensor,
+        generator: torch.Generator,
+    ) -> Tensor:
+        seen = _known(training, pool, torch.cat(self._seen))
+        forest = grow(seen, torch.cat(self._losses), generator, **self._forest)
+        return forest(_known(training, pool, candidates))
+
+    def chose(self, training: Training, pool: CompactPatches, numbers: Tensor) -> None:
+        """Losses count relative to those of their round: later ones are lower."""
+        parts = numbers.split(CHUNK)
+        losses = torch.cat([training.losses(chosen(pool, part)) for part in parts])
+        self._seen.append(numbers)
+        self._losses.append(losses / losses.mean())
+
+
+def _known(training: Training, pool: CompactPatches, numbers: Tensor) -> Tensor:
+    """[n, F] of patches by their numbers."""
+    parts = [chosen(pool, part) for part in numbers.split(CHUNK)]
+    return torch.cat(
+        [
+            torch.cat([training.described(part), training.disagreement(part)[:, None]], dim=1)
+            for part in parts
+        ]
+    )
+
+
+def true_errors(
+    training: Training, pool: CompactPatches, truth: Tensor, candidates: Tensor
+) -> Tensor:
+    """[n] of the patches with these numbers, under the averaged weights."""
+    parts = candidates.split(CHUNK)
+    return torch.cat([training.errors(chosen(pool, part), truth[part]) for part in parts])
