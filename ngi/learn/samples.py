@@ -139,7 +139,7 @@ class PatchSamples(Samples):
     def test_inputs(
         self, scene_vector: Tensor, buffers: Tensor, *, preview: bool = False
     ) -> tuple[Tensor, ...]:
-        """V [D], or what is seen of it, and of a supersampled image `quarters`."""
+        """What is seen of v, [D] or less, and of a supersampled image `quarters`."""
         seen = self._of(scene_vector)
         if preview or not self.supersampled_edges:
             return (seen,)
