@@ -40,7 +40,7 @@ def quarters(
     as many rays as a pixel. Some pixels may come twice, see `SIZES`.
     """
     side = len(buffers)
-    pixels = edges(buffers, renderer.layout).flatten().nonzero().flatten()
+    pixels = edges(buffers, renderer.layout).flatten().cpu().nonzero().flatten()
     if len(pixels) == 0:
         return ()
     unit = max(1, side**2 // SIZES)

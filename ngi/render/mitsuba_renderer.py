@@ -195,7 +195,7 @@ class MitsubaRenderer(Renderer):
         require_positive(resolution=resolution)
         mi.set_variant(self._variant)
         self._scene.apply(scene_vector)
-        parts = pixels.cpu().split(max(1, PATHS_PER_LAUNCH // self.buffer_samples))
+        parts = pixels.split(max(1, PATHS_PER_LAUNCH // self.buffer_samples))
         listed = [PixelList(part, resolution) for part in parts]
         return self._encode(self._mean_buffers(listed, self.buffer_samples))
 

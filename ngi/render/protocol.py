@@ -136,7 +136,7 @@ class Renderer(Protocol):
     def pixel_buffers(self, scene_vector: Tensor, pixels: Tensor, *, resolution: int) -> Tensor:
         """[n, C] float32: what `image_buffers` has at n pixels, without making the others.
 
-        pixels: [n] int64, of the image's, counted from 0 row by row; n >= 1
+        pixels: [n] int64 on the CPU, of the image's, counted from 0 row by row; n >= 1
         """
         ...
 

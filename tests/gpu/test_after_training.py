@@ -85,6 +85,21 @@ def test_the_viewer_shows_what_the_network_says(finished: Path) -> None:
     assert pictures[-1].pixels.shape == (24, 24, 3)
 
 
+def test_supersampled_edges_are_those_that_a_cpu_shows(finished: Path) -> None:
+    """Shown twice, since the second image of a size is launched as it was recorded."""
+    v = TrainedRun.open(finished).renderer.hard_frames()[0]
+    expected = TrainedRun.open(finished, supersampled_edges=True).radiance(v, resolution=64)
+    with pretended_gpu():
+        run = TrainedRun.open(finished, supersampled_edges=True)
+        assert next(run.network.parameters()).is_cuda
+        for _ in range(3):
+            shown = run.radiance(v, resolution=64)
+            assert not shown.is_cuda
+            torch.testing.assert_close(shown, expected, rtol=2e-2, atol=2e-2)
+    once = TrainedRun.open(finished).radiance(v, resolution=64)
+    assert not torch.equal(once, expected)
+
+
 @pytest.mark.usefixtures("gpu")
 def test_it_is_exported_from_the_cpu(
     finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
