@@ -22,7 +22,7 @@ from ngi.view.live import LiveView, axes, live_view
 from ngi.view.page import Page
 from ngi.view.training_figure import Axis, Visited, training_figure
 from tests.config.command_line import composed
-from tests.learn.command_line import run
+from tests.learn.command_line import SMALL, run
 from tests.learn.composition import run_config
 from tests.learn.lightning_warnings import IGNORED
 from tests.methods.anf import test_runs as anf
@@ -140,7 +140,7 @@ def test_a_training_goes_on_when_its_picture_fails(
     monkeypatch.setattr(Page, "visitors", 1)
     monkeypatch.setattr(live, "training_figure", broken)
     page = ("viewer=true", "run.viewer_port=0", "budget.steps=3")
-    train(run_config(*page, f"run.folder={tmp_path / 'run'}"))
+    train(run_config(*SMALL, *page, f"run.folder={tmp_path / 'run'}"))
     assert (tmp_path / "run" / "result.json").exists()
     assert "the page's picture of the training failed; the training goes on" in caplog.text
 
