@@ -8,7 +8,7 @@ import pytest
 from analysis.ceiling import EVERYWHERE, NO_CHOICE, differences
 from analysis.statistics import Estimate, paired_difference
 from tests.docs.pages import ROOT
-from tests.docs.test_figures import geometric_mean
+from tests.docs.test_figures import geometric_mean, said
 
 MAP = "exploration_map.csv.gz"
 """Of every folder with runs of the map."""
@@ -53,10 +53,23 @@ def test_what_is_said_of_who_knows_where_the_rare_is_is_what_the_runs_say() -> N
         assert cell == f"{errors}: {', '.join(map(percent, change))} %"
 
 
-def test_what_an_oracle_takes_off_dear_patches_is_what_the_runs_say() -> None:
+def of_dear_patches() -> pd.DataFrame:
+    """All runs of the ceiling at the scenes' own samples per pixel."""
     folder, run = ROOT / "docs/exploration-ceiling", ["scene", "choice", "patches", "steps", "seed"]
     tables = [pd.read_csv(folder / name) for name in ("scarce_ceiling.csv", "scarce_seeds.csv")]
-    runs = pd.concat(tables).set_index(run).sort_index()
+    return pd.concat(tables).set_index(run).sort_index()
+
+
+def by_oracle_of_dear_patches(patches: int, steps: int) -> Estimate:
+    """The mean over scenes of each one's mean over all of its seeds, hard frames."""
+    error = of_dear_patches()["hard_error"]
+    ratio = error.xs("oracle", level="choice") / error.xs("uniform", level="choice")
+    by_scene = ratio.xs((patches, steps), level=("patches", "steps")).groupby("scene").mean()
+    return difference_of(0 * by_scene + 1, by_scene)
+
+
+def test_what_an_oracle_takes_off_dear_patches_is_what_the_runs_say() -> None:
+    runs = of_dear_patches()
     page = "docs/exploration-ceiling/scarce.md"
     rows = rows_of(page, "What an oracle takes off")[2:9]
     sizes = ((128, 800), (256, 1600), (512, 3200))
@@ -71,8 +84,22 @@ def test_what_an_oracle_takes_off_dear_patches_is_what_the_runs_say() -> None:
         everything, half = error["uniform", 1024, 1600], error["uniform", 256, 1600]
         assert row[4] == as_shown(difference_of(half, everything)).split(" ")[0]
 
+    means = rows_of(page, "What an oracle takes off")[9]
+    for cell, size in zip(means[1:3], sizes[:2], strict=True):
+        assert cell == as_shown(by_oracle_of_dear_patches(*size)).split(" %")[0]
+
     shown = rows_of(page, "What comes near to it on bathroom")[2:]
-    new = tables[1].query("scene == 'bathroom' and patches == 256").set_index(["choice", "seed"])
+    oracle = by_oracle_of_dear_patches(256, 1600)
+    measured = tuple(as_shown(oracle).lstrip("−").split(" %")[0].split(" ± "))
+    for where, before, after in (
+        ("README.md", "few and clean ", ": the"),
+        ("docs/guide/sampler.md", r"a quarter of them \[", r"\]"),
+        ("docs/exploration-ceiling/README.md", "the oracle takes ", " off hard frames after 256"),
+    ):
+        assert said(where, rf"{before}(\d\.\d) % ± (\d\.\d){after}") == measured
+
+    seeds = pd.read_csv(ROOT / "docs/exploration-ceiling/scarce_seeds.csv")
+    new = seeds.query("scene == 'bathroom' and patches == 256").set_index(["choice", "seed"])
     ways = ("oracle", "disagreement", "forest", "predicted")
     for row, choice in zip(shown, ways, strict=True):
         for cell, error in zip(row, ("hard_error", "hard_tail", "uniform_error"), strict=False):
