@@ -74,9 +74,9 @@ def test_a_windows_strip_gets_a_picture_all_the_same(browser: Browser) -> None:
 def test_the_radiance_of_a_buffers_picture_is_made_where_pictures_are(browser: Browser) -> None:
     made_in: list[int] = []
 
-    def predict(buffers: torch.Tensor, v: torch.Tensor, *, preview: bool) -> torch.Tensor:  # noqa: ARG001
+    def predict(buffers: torch.Tensor, v: torch.Tensor, *, preview: bool) -> torch.Tensor:
         made_in.append(get_ident())
-        return coloured(buffers, v)
+        return coloured(buffers, v, preview=preview)
 
     files: list[str] = []
     browser.send_file_download = lambda name, *_, **__: files.append(name)  # type: ignore[attr-defined]

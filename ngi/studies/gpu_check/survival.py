@@ -32,13 +32,14 @@ def _status(command: Sequence[str]) -> int:
 
     A terminal's Ctrl-C reaches both; this one waits until the other has noted what it had begun.
     """
-    process = subprocess.Popen(command)
-    handlers = {
-        signal.SIGTERM: lambda *_: process.send_signal(signal.SIGINT),
-        signal.SIGINT: lambda *_: None,
-    }
-    former = {number: signal.signal(number, handler) for number, handler in handlers.items()}
+    # Handled before it begins: what is ignored here, as Ctrl-C is of commands in the background,
+    # would be ignored there, too.
+    former = {signal.SIGINT: signal.signal(signal.SIGINT, lambda *_: None)}
     try:
+        process = subprocess.Popen(command)
+        former[signal.SIGTERM] = signal.signal(
+            signal.SIGTERM, lambda *_: process.send_signal(signal.SIGINT)
+        )
         return process.wait()
     finally:
         for number, handler in former.items():

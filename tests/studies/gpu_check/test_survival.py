@@ -3,7 +3,9 @@
 import signal
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -51,9 +53,18 @@ def test_who_ends_the_process_ends_the_command(tmp_path: Path, asked: signal.Sig
     assert ended(tmp_path, asked) == (-asked, 1)
 
 
+@pytest.fixture(params=["foreground", "background"])
+def ctrl_c(request: pytest.FixtureRequest) -> Iterator[Any]:
+    """What Python does at Ctrl-C, and what it does of a command that a shell began with '&'."""
+    wanted = {"foreground": signal.default_int_handler, "background": signal.SIG_IGN}[request.param]
+    former = signal.signal(signal.SIGINT, wanted)
+    yield wanted
+    signal.signal(signal.SIGINT, former)
+
+
 @pytest.mark.parametrize("asked", [signal.SIGTERM, signal.SIGINT])
 def test_a_signal_to_the_command_leaves_no_process_behind(
-    tmp_path: Path, asked: signal.Signals
+    tmp_path: Path, asked: signal.Signals, ctrl_c: Any
 ) -> None:
     """The other process gets SIGTERM as Ctrl-C; Ctrl-C it has from the terminal."""
     code = """
@@ -71,7 +82,8 @@ raise SystemExit(5)
     status = surviving(lambda: command, progress=tmp_path)
     assert status == (130 if asked is signal.SIGTERM else 5)
     assert (tmp_path / "begun").exists()
-    assert signal.getsignal(asked) in (signal.SIG_DFL, signal.default_int_handler)
+    assert signal.getsignal(signal.SIGINT) is ctrl_c
+    assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
 
 
 def test_the_next_process_has_the_time_that_is_left(
