@@ -74,8 +74,6 @@ def test_which_edges_and_how_many_rays_a_quarter_needs() -> None:
         assert row[0] == str(rays)
         for cell, scene in zip(row[1:], (*SCENES, "sphere-caustic"), strict=True):
             run = runs.loc[(edges, rays, scene)]
-            hard, hard_tail, uniform, uniform_tail = (
-                tenths(run[column] / 100).replace("−0.0", "0.0") for column in columns
-            )
-            expected = f"{hard}, {hard_tail} / {uniform}, {uniform_tail}".replace("+0.0", "0.0")
+            pairs = columns[:2], columns[2:]
+            expected = " / ".join(shown(1 + run[pair] / 100) for pair in pairs)
             assert cell == f"{100 * run.share:.0f} %: {expected}"

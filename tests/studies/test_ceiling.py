@@ -185,7 +185,7 @@ def recorded(monkeypatch: pytest.MonkeyPatch):
             training,
             pool=pool,
             truth=torch.zeros(1000),
-            choice=Oracle(choice, torch.zeros(1000)),
+            choice=Oracle(choice, training=training, pool=pool, truth=torch.zeros(1000)),
             rounds=4,
             evaluator=NoEvaluator(),
         )
@@ -279,11 +279,19 @@ class Disagreeing(Recorder):
 def test_predictions_find_what_was_lost_where_something_tells_of_it(tells: bool) -> None:
     """A tenth of all numbers is lost on; of those that are drawn after the first round, a third."""
     training = Disagreeing(tells=tells)
-    choice = Predicted(importance=Importance(uniform_share=0.0), trees=16, depth=4, smallest_leaf=1)
+    pool = torch.arange(1000.0)
+    choice = Predicted(
+        importance=Importance(uniform_share=0.0),
+        trees=16,
+        depth=4,
+        smallest_leaf=1,
+        training=training,
+        pool=pool,
+    )
     runs.do(
         Run(patches=120, steps=4, choice="any", seed=0),
         training,
-        pool=torch.arange(1000.0),
+        pool=pool,
         truth=torch.zeros(1000),
         choice=choice,
         rounds=4,

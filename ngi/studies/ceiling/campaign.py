@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
@@ -60,7 +61,7 @@ def run_all(config: DictConfig) -> Path:
                 training,
                 pool=pool,
                 truth=truth,
-                choice=_choice(study.choices[run.choice], truth),
+                choice=_choice(study.choices[run.choice], training, pool, truth),
                 rounds=study.rounds,
                 evaluator=evaluator,
             )
@@ -71,10 +72,12 @@ def run_all(config: DictConfig) -> Path:
     return folder / TABLE
 
 
-def _choice(option: DictConfig, truth: Tensor) -> Choice:
+def _choice(option: DictConfig, training: Training, pool: CompactPatches, truth: Tensor) -> Choice:
     """Of one run. An option that only says how values count is an oracle's."""
-    made: Choice | Importance = instantiate(option)
-    return Oracle(made, truth) if isinstance(made, Importance) else made
+    made: Importance | Callable[..., Choice] = instantiate(option)
+    if isinstance(made, Importance):
+        return Oracle(made, training=training, pool=pool, truth=truth)
+    return made(training=training, pool=pool)
 
 
 def _rendered(config: DictConfig, folder: Path) -> tuple[Samples, Evaluator, CompactPatches]:

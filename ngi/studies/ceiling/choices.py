@@ -24,17 +24,11 @@ class Choice(Protocol):
 
     importance: Importance
 
-    def values(
-        self,
-        training: Training,
-        pool: CompactPatches,
-        candidates: Tensor,
-        generator: torch.Generator,
-    ) -> Tensor:
+    def values(self, candidates: Tensor, generator: torch.Generator) -> Tensor:
         """[n], at least 0, of the patches with these numbers."""
         ...
 
-    def chose(self, training: Training, pool: CompactPatches, numbers: Tensor) -> None:
+    def chose(self, numbers: Tensor) -> None:
         """These were chosen, and are not trained on yet."""
         return
 
@@ -45,18 +39,14 @@ class Oracle(Choice):
     truth: [m, h, w, 3] log1p radiance of the pool, see `Training.answers`
     """
 
-    def __init__(self, importance: Importance, truth: Tensor) -> None:
+    def __init__(
+        self, importance: Importance, *, training: Training, pool: CompactPatches, truth: Tensor
+    ) -> None:
         self.importance = importance
-        self._truth = truth
+        self._training, self._pool, self._truth = training, pool, truth
 
-    def values(
-        self,
-        training: Training,
-        pool: CompactPatches,
-        candidates: Tensor,
-        generator: torch.Generator,
-    ) -> Tensor:
-        return true_errors(training, pool, self._truth, candidates)
+    def values(self, candidates: Tensor, generator: torch.Generator) -> Tensor:
+        return true_errors(self._training, self._pool, self._truth, candidates)
 
 
 class Predicted(Choice):
@@ -69,28 +59,30 @@ class Predicted(Choice):
     """
 
     def __init__(
-        self, *, importance: Importance, trees: int, depth: int, smallest_leaf: int
+        self,
+        *,
+        importance: Importance,
+        trees: int,
+        depth: int,
+        smallest_leaf: int,
+        training: Training,
+        pool: CompactPatches,
     ) -> None:
         self.importance = importance
         self._forest = {"trees": trees, "depth": depth, "smallest_leaf": smallest_leaf}
+        self._training, self._pool = training, pool
         self._seen: list[Tensor] = []
         self._losses: list[Tensor] = []
 
-    def values(
-        self,
-        training: Training,
-        pool: CompactPatches,
-        candidates: Tensor,
-        generator: torch.Generator,
-    ) -> Tensor:
-        seen = _known(training, pool, torch.cat(self._seen))
+    def values(self, candidates: Tensor, generator: torch.Generator) -> Tensor:
+        seen = _known(self._training, self._pool, torch.cat(self._seen))
         forest = grow(seen, torch.cat(self._losses), generator, **self._forest)
-        return forest(_known(training, pool, candidates))
+        return forest(_known(self._training, self._pool, candidates))
 
-    def chose(self, training: Training, pool: CompactPatches, numbers: Tensor) -> None:
+    def chose(self, numbers: Tensor) -> None:
         """Losses count relative to those of their round: later ones are lower."""
         parts = numbers.split(CHUNK)
-        losses = torch.cat([training.losses(chosen(pool, part)) for part in parts])
+        losses = torch.cat([self._training.losses(chosen(self._pool, part)) for part in parts])
         self._seen.append(numbers)
         self._losses.append(losses / losses.mean())
 

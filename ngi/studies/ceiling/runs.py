@@ -84,9 +84,9 @@ def do(
             drawn = torch.randperm(len(candidates), generator=generator)[:count]
             weights = torch.ones(count, dtype=torch.float64)
         else:
-            values = choice.values(training, pool, candidates, generator)
+            values = choice.values(candidates, generator)
             drawn, weights = choice.importance.draw(values, count, generator)
-        choice.chose(training, pool, candidates[drawn])
+        choice.chose(candidates[drawn])
         training.add(chosen(pool, candidates[drawn]), weights)
         left[candidates[drawn]] = False
         training.train(_part(run.steps, number, rounds))
