@@ -25,6 +25,7 @@ TITLES = {
     "ours": "ours with a Sobol sequence",
     "ours_predicted": "ours with more states of high predicted loss",
     "ours_eager": "ours after what is rare, by predicted loss",
+    "ours_predicted_from_buffers": "ours with patches chosen by their buffers",
     "ours_supersampled": "ours with supersampled edges",
     "ours_exploring": "ours exploring, with Active Exploration's chains",
     "ours_loss_target": "ours exploring, with the loss alone as target",

@@ -81,7 +81,7 @@ def build_module(
     """Network, loss and optimiser, for these samples. folder: for the guard's report."""
     from ngi import learn
 
-    return learn.IlluminationModule(
+    module = learn.IlluminationModule(
         network=build_network(config, samples=samples),
         loss=instantiate(config.loss),
         optimizer=instantiate(config.optimizer),
@@ -91,6 +91,9 @@ def build_module(
         guard=learn.StepGuard(stream=stream, folder=folder),
         averaging=instantiate(config.averaging),
     )
+    if stream.sampler.needs_description:
+        stream.describe = learn.Description(samples=samples, disagreement=module.disagreement)
+    return module
 
 
 def build_run(
@@ -156,8 +159,13 @@ def run_components(config: DictConfig, *, renderer: Renderer) -> list[learn.Comp
 
     if "path_tracing" in config:
         return []
-    scored = instantiate(config.sampler).needs_current
-    return learn.components(plain(config), renderer=renderer, scored=scored)
+    sampler = instantiate(config.sampler)
+    if sampler.needs_description:
+        raise ValueError(
+            "sampler: it looks at patches before they are traced, which the model clock does not "
+            "count; with budget.clock=wall, or with budget.steps, there is no need to"
+        )
+    return learn.components(plain(config), renderer=renderer, scored=sampler.needs_current)
 
 
 def run_costs(

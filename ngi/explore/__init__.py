@@ -6,12 +6,14 @@ Tensors only: neither renderer nor network is known here.
 from ngi.explore.acceptance import Acceptance, Always, Greedy, Metropolis
 from ngi.explore.chains import ChainInfo, ChainState, MarkovChains
 from ngi.explore.importance import Importance
-from ngi.explore.predicted import PredictedLoss
+from ngi.explore.predicted import PredictedFromBuffers, PredictedLoss
 from ngi.explore.proposals import (
+    Describe,
     ExponentialPerturbation,
     NormalPerturbation,
     ProposalDistribution,
     Proposals,
+    nothing_known,
 )
 from ngi.explore.resolution import GrowingResolution, ResolutionSchedule
 from ngi.explore.sampler import Sampler
@@ -25,6 +27,7 @@ __all__ = [
     "ChainInfo",
     "ChainState",
     "ConstantTarget",
+    "Describe",
     "ExponentialPerturbation",
     "Greedy",
     "GrowingResolution",
@@ -36,6 +39,7 @@ __all__ = [
     "MarkovChains",
     "Metropolis",
     "NormalPerturbation",
+    "PredictedFromBuffers",
     "PredictedLoss",
     "ProposalDistribution",
     "Proposals",
@@ -44,4 +48,5 @@ __all__ = [
     "Signals",
     "Sobol",
     "Target",
+    "nothing_known",
 ]

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from ngi.explore.acceptance import Acceptance
-from ngi.explore.proposals import ProposalDistribution, Proposals
+from ngi.explore.proposals import Describe, ProposalDistribution, Proposals, nothing_known
 from ngi.explore.targets import Target
 
 
@@ -110,6 +110,8 @@ class MarkovChains:
     All methods are pure; states and `generator` are on one device.
     """
 
+    needs_description = False
+
     def __init__(
         self,
         *,
@@ -137,7 +139,14 @@ class MarkovChains:
         """
         return ChainState.empty(self.chains, state_dimensions)
 
-    def propose(self, state: ChainState, generator: torch.Generator, *, batch: int) -> Proposals:
+    def propose(
+        self,
+        state: ChainState,
+        generator: torch.Generator,
+        *,
+        batch: int,
+        describe: Describe = nothing_known,  # noqa: ARG002 - chains know where they stand
+    ) -> Proposals:
         """One proposal per chain; one that holds no state makes a large step (paper, Sec. 5).
 
         batch: how often the run has proposed before, proposals that were given up included

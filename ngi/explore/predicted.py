@@ -3,6 +3,7 @@
 # ruff: noqa: ARG002 - a sampler is given more than it need look at
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -10,7 +11,7 @@ from torch import Tensor
 from ngi.explore.chains import ChainInfo, ChainState
 from ngi.explore.forest import Forest, grow
 from ngi.explore.importance import Importance
-from ngi.explore.proposals import Proposals
+from ngi.explore.proposals import Describe, Proposals, nothing_known
 from ngi.explore.targets import Constant
 
 NEWER_SHARE = 1 / 8
@@ -19,12 +20,15 @@ NEWER_SHARE = 1 / 8
 SEEN_TOGETHER = 64
 """Losses that the network had as much training for, roughly."""
 
+PATCHES_OF_ONE_VECTOR = 8
+"""Of a batch's candidates, where they are looked at."""
+
 
 @dataclass(frozen=True)
 class PredictedState(ChainState):
     """What the next states are predicted from, beside those that were drawn last.
 
-    seen: [m, S], the newest states that were rendered, oldest first
+    seen: [m, S], the newest states that were rendered, oldest first; [m, F] described
     loss: [m], what each lost when it was new: before the network was trained on it
     newer: [], how many were seen since the forest was grown
     feature, threshold, leaf: of the forest
@@ -61,6 +65,7 @@ class PredictedLoss:
     """
 
     needs_current = False
+    needs_description = False
 
     def __init__(
         self,
@@ -85,6 +90,8 @@ class PredictedLoss:
                 raise ValueError(f"sampler.{name}: {value}: give at least {least}")
         self.chains = chains
         self.target = Constant()
+        self._newer_share = NEWER_SHARE
+        self._seen_together = SEEN_TOGETHER
         self._candidates = candidates
         self._importance = importance
         self._memory = memory
@@ -96,7 +103,7 @@ class PredictedLoss:
         return PredictedState.empty(
             self.chains,
             state_dimensions,
-            seen=torch.zeros(0, max(state_dimensions, 0)),
+            seen=torch.zeros(0),
             loss=torch.zeros(0),
             newer=torch.tensor(0),
             feature=forest.feature,
@@ -105,16 +112,28 @@ class PredictedLoss:
         )
 
     def propose(
-        self, state: PredictedState, generator: torch.Generator, *, batch: int
+        self,
+        state: PredictedState,
+        generator: torch.Generator,
+        *,
+        batch: int,
+        describe: Describe = nothing_known,
     ) -> Proposals:
         """A batch of states, uniform ones as long as fewer than 2 n were seen."""
         shape = self._candidates, state.position.shape[1]
         candidates = torch.empty(shape).uniform_(generator=generator)
-        chosen, weights = self._importance.draw(state.forest(candidates), self.chains, generator)
+        return self._chosen(candidates, candidates, state.forest(candidates), generator)
+
+    def _chosen(
+        self, candidates: Tensor, known: Tensor, values: Tensor, generator: torch.Generator
+    ) -> Proposals:
+        """As many candidates [m, S] as a batch has, drawn by their values [m]; known: [m, F]."""
+        chosen, weights = self._importance.draw(values, self.chains, generator)
         return Proposals(
             position=candidates[chosen],
             large_step=torch.ones(self.chains, dtype=torch.bool),
             weight=weights.float() if self._importance.weighted else None,
+            known=known[chosen],
         )
 
     def accept(
@@ -129,13 +148,15 @@ class PredictedLoss:
         losses: Tensor,
     ) -> tuple[PredictedState, ChainInfo]:
         """Remembers the proposals' losses, [n]; those that are NaN or infinite are forgotten."""
-        known = losses.isfinite()
-        seen = torch.cat([state.seen, proposals.position[known]])[-self._memory :]
-        loss = torch.cat([state.loss, losses[known]])[-self._memory :]
-        newer = state.newer + known.sum()
+        assert proposals.known is not None
+        finite = losses.isfinite()
+        seen = torch.cat([state.seen, proposals.known[finite]])[-self._memory :]
+        loss = torch.cat([state.loss, losses[finite]])[-self._memory :]
+        newer = state.newer + finite.sum()
         forest = state.forest
-        if len(seen) >= 2 * self.chains and newer >= NEWER_SHARE * len(seen):
-            forest = grow(seen, _of_their_time(loss), generator, **self._forest)
+        if len(seen) >= 2 * self.chains and newer >= self._newer_share * len(seen):
+            losses = self._of_their_time(loss)
+            forest = grow(seen, losses, generator, **self._forest)
             newer = torch.tensor(0)
         moved = replace(
             state,
@@ -152,14 +173,58 @@ class PredictedLoss:
         everywhere = torch.ones(self.chains, dtype=torch.bool)
         return moved, ChainInfo(everywhere, everywhere, ~state.occupied, moved.age)
 
+    def _of_their_time(self, losses: Tensor) -> Tensor:
+        """Each divided by the mean of those that were seen shortly before and after it, [m].
 
-def _of_their_time(losses: Tensor) -> Tensor:
-    """Each divided by the mean of those that were seen shortly before and after it, [m].
+        A network loses less everywhere as it learns: without this the first states would look as
+        if they were the worst until they are forgotten, which takes most of a run that reuses
+        patches.
+        """
+        count = min(self._seen_together, len(losses))
+        first = (torch.arange(len(losses)) - count // 2).clamp(0, len(losses) - count)
+        mean = losses[first[:, None] + torch.arange(count)].mean(dim=1)
+        return torch.where(mean > 0, losses / mean, 0.0)
 
-    A network loses less everywhere as it learns: without this the first states would look as if
-    they were the worst until they are forgotten, which takes most of a run that reuses patches.
+
+class PredictedFromBuffers(PredictedLoss):
+    """`PredictedLoss` where patches are dear, so that there is time to look before one is traced.
+
+    The forest is grown through what `describe` tells of the states (of a run: buffers, v, and how
+    far the network's present and averaged weights disagree) in place of the states themselves. What
+    a state is worth is the loss so predicted, times the root of the disagreement: where it is high
+    the network is still learning, while a loss can be high by what it never learns.
+
+    What sets a scene up for one patch shows others of the same v, too: candidates are groups of
+    `PATCHES_OF_ONE_VECTOR` that differ in the patch position.
+
+    candidates: per batch, at least n and a multiple of that number
     """
-    count = min(SEEN_TOGETHER, len(losses))
-    first = (torch.arange(len(losses)) - count // 2).clamp(0, len(losses) - count)
-    mean = losses[first[:, None] + torch.arange(count)].mean(dim=1)
-    return torch.where(mean > 0, losses / mean, 0.0)
+
+    needs_description = True
+
+    def __init__(self, *, chains: int, candidates: int, **others: Any) -> None:
+        super().__init__(chains=chains, candidates=candidates, **others)
+        if candidates % PATCHES_OF_ONE_VECTOR:
+            raise ValueError(
+                f"sampler.candidates: {candidates}: give a multiple of {PATCHES_OF_ONE_VECTOR}, "
+                "for candidates are patches of so many positions in the image of each scene vector"
+            )
+        self._newer_share = 0.0  # a forest grows in no time, beside paths
+        self._seen_together = 2 * chains
+
+    def propose(
+        self,
+        state: PredictedState,
+        generator: torch.Generator,
+        *,
+        batch: int,
+        describe: Describe = nothing_known,
+    ) -> Proposals:
+        """See `PredictedLoss.propose`."""
+        shape = self._candidates, state.position.shape[1]
+        candidates = torch.empty(shape).uniform_(generator=generator)
+        first = candidates[::PATCHES_OF_ONE_VECTOR, :-2]
+        candidates[:, :-2] = first.repeat_interleave(PATCHES_OF_ONE_VECTOR, dim=0)
+        known = describe(candidates)
+        values = state.forest(known) * known[:, -1].sqrt()
+        return self._chosen(candidates, known, values, generator)

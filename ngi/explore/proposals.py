@@ -3,6 +3,7 @@
 # ruff: noqa: ARG002 - a distribution is given more than it need look at
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -17,11 +18,25 @@ class Proposals:
     position: [n, S] float32 in [0, 1), the scene vector and then the patch position
     large_step: [n] bool, whether the proposal is independent of the chain's current state
     weight: [n] float32, factors of the losses that undo how likely each was; None for 1
+    known: [n, F] float32, what was known of them when they were chosen; None where nobody asked
     """
 
     position: Tensor
     large_step: Tensor
     weight: Tensor | None = None
+    known: Tensor | None = None
+
+
+Describe = Callable[[Tensor], Tensor]
+"""What is known of states [m, S] before paths are traced there, [m, F].
+
+The last number, at least 0, is how far from settled the network is there, in units of their mean.
+"""
+
+
+def nothing_known(states: Tensor, *_: object) -> Tensor:
+    """The `Describe` of a run that has none: RuntimeError."""
+    raise RuntimeError(f"{len(states)} states are to be described, and nobody said what by")
 
 
 class ProposalDistribution(Protocol):

@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 
 from ngi.explore.chains import ChainInfo
-from ngi.explore.proposals import Proposals
+from ngi.explore.proposals import Describe, Proposals, nothing_known
 from ngi.explore.targets import Target
 
 
@@ -22,11 +22,23 @@ class Sampler(Protocol):
         """Whether the states where it stands have to be scored, too."""
         ...
 
+    @property
+    def needs_description(self) -> bool:
+        """Whether `propose` asks what is known of states."""
+        ...
+
     def init(self, state_dimensions: int) -> Any:
         """The state at the start of a run, for states of S = D + 2 dimensions."""
         ...
 
-    def propose(self, state: Any, generator: torch.Generator, *, batch: int) -> Proposals:
+    def propose(
+        self,
+        state: Any,
+        generator: torch.Generator,
+        *,
+        batch: int,
+        describe: Describe = nothing_known,
+    ) -> Proposals:
         """The n states to render next. batch: how often the run has proposed before."""
         ...
 

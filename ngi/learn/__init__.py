@@ -15,6 +15,7 @@ from ngi.learn.checkpoint import (
     read_checkpoint,
 )
 from ngi.learn.datamodule import ExplorationDataModule
+from ngi.learn.description import Description, features
 from ngi.learn.interruption import Interrupted, Interruption
 from ngi.learn.learning_rate import BaseRates
 from ngi.learn.lightning_trackers import MLflow, TensorBoard
@@ -43,6 +44,7 @@ __all__ = [
     "ConstantRate",
     "CostFile",
     "Costs",
+    "Description",
     "Example",
     "ExplorationDataModule",
     "Feedback",
@@ -74,6 +76,7 @@ __all__ = [
     "callbacks",
     "checkpoint_bytes",
     "components",
+    "features",
     "network_of",
     "patch_example",
     "prepare_resume",

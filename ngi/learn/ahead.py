@@ -5,7 +5,7 @@ soon as they have accepted or rejected the last proposals. Rendered early or lat
 or by others, these give the same patches: what changes is how long training waits for them.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, Self
 
 import torch
@@ -76,19 +76,13 @@ class ProposalsAhead:
 
     def state_dict(self) -> dict[str, Any]:
         """What has to be rendered, not what has been: that is rendered again."""
-        return {
-            "position": self.proposals.position,
-            "large_step": self.proposals.large_step,
-            "weight": self.proposals.weight,
-            "resolution": self.resolution,
-            "seed": self.seed,
-        }
+        return {**vars(self.proposals), "resolution": self.resolution, "seed": self.seed}
 
     @classmethod
     def from_state_dict(cls, state: dict[str, Any]) -> Self:
         """The same proposals, not started."""
         return cls(
-            Proposals(state["position"], state["large_step"], state["weight"]),
+            Proposals(**{field.name: state[field.name] for field in fields(Proposals)}),
             resolution=state["resolution"],
             seed=state["seed"],
         )

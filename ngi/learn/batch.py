@@ -9,6 +9,9 @@ from torch import Tensor
 
 from ngi.patches import Patches, uploaded
 
+ENDLESS = 2**31
+"""The length of a stream, in batches."""
+
 
 @dataclass(frozen=True)
 class Batch:

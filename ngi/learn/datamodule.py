@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 from typing import Any
 
-from ngi.learn.batch import Batch
+from ngi.learn.batch import ENDLESS, Batch
 from ngi.learn.lightning_api import LightningDataModule
-from ngi.learn.stream import ENDLESS, TrainingStream
+from ngi.learn.stream import TrainingStream
 
 
 class EndlessBatches:

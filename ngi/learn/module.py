@@ -132,6 +132,23 @@ class IlluminationModule(LightningModule):
             output: Tensor = self._image(*on_device)[0]
         return output.float().cpu()
 
+    def disagreement(self, *inputs: Tensor) -> Tensor:
+        """[n] mean absolute differences of log1p radiance by present and by averaged weights.
+
+        inputs: the network's of [n] images, on any device. On the CPU. Raises ValueError where no
+        weights are averaged.
+        """
+        if self.averaged is None:
+            raise ValueError(
+                "averaging: what present and averaged weights disagree on is asked for, and none "
+                "are averaged; give averaging=exponential"
+            )
+        on_device = [tensor.to(self.device) for tensor in inputs]
+        with torch.no_grad(), self.trainer.precision_plugin.forward_context():
+            present, averaged = self.network(*on_device), self.averaged.module(*on_device)
+        difference: Tensor = present.float() - averaged.float()
+        return difference.abs().mean(dim=(1, 2, 3)).cpu()
+
     def signals(self, patches: Patches, target: Target) -> Signals:
         """What `target` requires of [n] patches under the present weights and moments.
 

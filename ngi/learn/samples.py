@@ -9,6 +9,7 @@ import torch
 from torch import Tensor, nn
 
 from ngi.denoise import Denoiser, denoised
+from ngi.learn.glimpses import glimpsed_buffers
 from ngi.learn.supersampling import quarters, with_quarters
 from ngi.patches import BufferLayout, Patches
 from ngi.render.protocol import Deferred, PatchJob, Renderer
@@ -52,6 +53,17 @@ class Samples(Protocol):
         """`count` black samples, for a rehearsal; patches, where a sample is one."""
         return Patches.blank(
             count, layout=self.layout, dimensions=self.dimensions, patch_size=self.patch_size
+        )
+
+    def glimpses(self, states: Tensor, *, resolution: int) -> tuple[Tensor, ...]:  # noqa: ARG002
+        """Inputs of the network at few pixels of patches at states [n, dimensions + 2].
+
+        What samplers that look before they choose look at. Raises ValueError where samples are no
+        patches.
+        """
+        raise ValueError(
+            f"sampler: it looks at patches before they are traced, and {type(self).__name__} makes "
+            "samples of another kind; choose another sampler, for example sampler=uniform"
         )
 
     def rearranged(self, patches: Patches, generator: torch.Generator) -> Patches:  # noqa: ARG002
@@ -130,6 +142,11 @@ class PatchSamples(Samples):
     def start_patches(self, states: Tensor, *, resolution: int, seed: int) -> PatchJob:
         job = self._renderer.start_patches(states, resolution=resolution, seed=seed)
         return job if self._denoise is None else Deferred(self._denoise, job)
+
+    def glimpses(self, states: Tensor, *, resolution: int) -> tuple[Tensor, ...]:
+        """Buffers [n, h, w, C] of one pixel in 16, and v [n, D], or what is seen of it."""
+        buffers = glimpsed_buffers(states, self._renderer, resolution=resolution)
+        return buffers, self._of(states[:, :-2])
 
     def example(self, patches: Patches) -> Example:
         """Buffers [n, P, P, C] and v [n, D], or what is seen of it."""

@@ -18,17 +18,14 @@ import torch
 
 from ngi.clock.counters import Counters
 from ngi.clock.phase_clock import PhaseClock
-from ngi.explore import ChainInfo, ChainState, ResolutionSchedule, Sampler
+from ngi.explore import ChainInfo, ChainState, ResolutionSchedule, Sampler, nothing_known
 from ngi.learn.ahead import ProposalsAhead
-from ngi.learn.batch import Batch, Feedback
+from ngi.learn.batch import ENDLESS, Batch, Feedback
 from ngi.learn.chain_trace import chain_record, chain_row
 from ngi.learn.new_losses import NewLosses
 from ngi.learn.samples import Samples
 from ngi.learn.saved_stores import SavedStores
 from ngi.reuse import Reuse
-
-ENDLESS = 2**31
-"""The length of a stream, in batches."""
 
 REFUSED_IN_A_ROW = 10
 """Batches with NaN or Inf after which the renderer, not a rare v, is to blame."""
@@ -73,6 +70,7 @@ class TrainingStream:
         self.new_losses = NewLosses()
         self.reuse_probability = 0.0
         self.chain_record: dict[str, np.ndarray] | None = None  # of a generated batch
+        self.describe: Callable[..., torch.Tensor] = nothing_known  # see `Description`
         self._chain_info: ChainInfo | None = None
         self._samples = samples
         self._policy = reuse.policy
@@ -214,13 +212,15 @@ class TrainingStream:
         """
         if self._ahead is None:
             with self.clock.phase("explore"):
-                self._ahead = ProposalsAhead(
-                    self.sampler.propose(
-                        self.chains, self._generator, batch=self.counters.proposed_batches
-                    ),
-                    resolution=self._schedule.resolution(self.counters.iteration),
-                    seed=int(torch.randint(2**31, (), generator=self._generator)),
+                resolution = self._schedule.resolution(self.counters.iteration)
+                proposals = self.sampler.propose(
+                    self.chains,
+                    self._generator,
+                    batch=self.counters.proposed_batches,
+                    describe=lambda states: self.describe(states, resolution),
                 )
+                seed = int(torch.randint(2**31, (), generator=self._generator))
+                self._ahead = ProposalsAhead(proposals, resolution=resolution, seed=seed)
         self._resolution = self._ahead.resolution
         with self.clock.phase("render"):
             self._ahead.start(self._samples)

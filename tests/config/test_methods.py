@@ -24,7 +24,8 @@ IN_A_CLAIM = (
 )
 """Ours without what a claim of the paper is about."""
 OURS = (
-    *("ours", "ours_uniform", "ours_predicted", "ours_eager", "ours_supersampled"),
+    *("ours", "ours_uniform", "ours_predicted", "ours_eager", "ours_predicted_from_buffers"),
+    "ours_supersampled",
     *(*EXPLORING, *IN_A_CLAIM),
 )
 LIGHT = ["specular", "direct and caustics"]
@@ -48,6 +49,10 @@ METHODS = {  # sampler, resolution, model, what the renderer traces into the buf
     "ours_uniform": ("uniform", "constant", "encoded_generator", LIGHT),
     "ours_predicted": ("predicted_loss", "constant", "encoded_generator", LIGHT),
     "ours_eager": ("predicted_loss_eager", "constant", "encoded_generator", LIGHT),
+    "ours_predicted_from_buffers": (
+        *("predicted_from_buffers", "constant", "encoded_generator"),
+        LIGHT,
+    ),
     "ours_supersampled": ("sobol", "constant", "encoded_generator", LIGHT),
     **{
         method: (sampler, "constant", "encoded_generator", LIGHT)

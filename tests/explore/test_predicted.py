@@ -1,12 +1,13 @@
 """The forest, and the sampler that draws by its predictions."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 import torch
 from scipy import stats
 
-from ngi.explore import Importance, PredictedLoss
+from ngi.explore import Importance, PredictedFromBuffers, PredictedLoss
 from ngi.explore.forest import PRIOR, grow
 from ngi.learn import TrainingStream
 from ngi.render import PocketRenderer
@@ -157,6 +158,96 @@ def test_a_forest_serves_until_an_eighth_of_what_is_remembered_is_newer() -> Non
     # From 8 states on; 4 are an eighth of up to 32, and 8 of up to 64.
     assert grown == [False, *[True] * 7, *[False, True] * 8]
     assert newer == [4, *[0] * 7, *[4, 0] * 8]
+
+
+def looking(**changes: object) -> PredictedFromBuffers:
+    arguments: dict[str, object] = {
+        "chains": CHAINS,
+        "candidates": 64,
+        "importance": Importance(uniform_share=0.0, power=4.0),
+        "memory": 256,
+        "trees": 8,
+        "depth": 4,
+        "smallest_leaf": 2,
+    }
+    return PredictedFromBuffers(**{**arguments, **changes})  # type: ignore[arg-type]
+
+
+def wave(states: torch.Tensor) -> torch.Tensor:
+    """0 or 1 at so many places that no forest finds them by the states."""
+    return ((states.double().sum(dim=1) * 1e4) % 1 < 0.2).float()
+
+
+def found_by(told: Callable[[torch.Tensor], torch.Tensor], *, falling: float = 1.0) -> float:
+    """The share of `wave`'s places among the states of a run's second half.
+
+    told: what is known of states [m, F]; falling: by which losses change from batch to batch
+    """
+    found, generator = looking(), torch.Generator().manual_seed(5)
+    state, shares = found.init(4), []
+    for batch in range(60):
+        proposals = found.propose(state, generator, batch=batch, describe=told)
+        lost = wave(proposals.position)
+        shares.append(lost.mean().item())
+        losses = (0.1 + lost) * falling**batch
+        ids, zeros = torch.arange(CHAINS), torch.zeros(CHAINS)
+        state, _ = found.accept(state, proposals, ids, zeros, zeros, generator, losses=losses)
+    return sum(shares[30:]) / 30
+
+
+def telling(states: torch.Tensor) -> torch.Tensor:
+    return torch.stack([wave(states), torch.ones(len(states))], dim=1)
+
+
+def test_what_is_known_finds_what_states_do_not_tell() -> None:
+    assert found_by(telling) > 0.5
+    assert found_by(lambda states: torch.ones(len(states), 2)) < 0.3
+
+
+def test_losses_of_a_network_that_learns_fast_count_among_those_of_their_batch() -> None:
+    """By a tenth from batch to batch: over 60 batches by a factor of 500."""
+    assert found_by(telling, falling=0.9) > 0.5
+
+
+def test_of_equal_predictions_the_less_settled_come_first() -> None:
+    def unsettled(states: torch.Tensor) -> torch.Tensor:
+        return torch.stack([torch.zeros(len(states)), 0.1 + 4.5 * wave(states)], dim=1)
+
+    found, generator = looking(), torch.Generator().manual_seed(6)
+    state = found.init(4)
+    chosen = torch.cat(
+        [found.propose(state, generator, batch=0, describe=unsettled).position for _ in range(50)]
+    )
+    assert wave(chosen).mean() > 0.8
+
+
+def test_candidates_are_patches_of_a_few_images() -> None:
+    asked: list[torch.Tensor] = []
+
+    def describe(states: torch.Tensor) -> torch.Tensor:
+        asked.append(states.clone())
+        return torch.ones(len(states), 1)
+
+    found = looking()
+    proposals = found.propose(found.init(5), torch.Generator(), batch=0, describe=describe)
+    groups = asked[0].unflatten(0, (8, 8))
+    assert (groups[:, :, :-2] == groups[:, :1, :-2]).all()
+    assert len(groups[:, 0, :-2].unique(dim=0)) == 8
+    assert len(asked[0][:, -2:].unique(dim=0)) == 64
+    assert all((asked[0] == state).all(dim=1).any() for state in proposals.position)
+
+
+def test_a_sampler_that_looks_needs_somebody_who_tells() -> None:
+    found = looking()
+    assert found.needs_description
+    assert not sampler().needs_description
+    with pytest.raises(RuntimeError, match="64 states are to be described"):
+        found.propose(found.init(5), torch.Generator(), batch=0)
+
+
+def test_candidates_that_are_no_groups_are_refused() -> None:
+    with pytest.raises(ValueError, match=r"sampler\.candidates: 60: give a multiple of 8"):
+        looking(candidates=60)
 
 
 @pytest.mark.parametrize(

@@ -264,10 +264,8 @@ class Disagreeing(Recorder):
         self.tells = tells
 
     def described(self, patches):
-        return torch.zeros(len(patches), 3)
-
-    def disagreement(self, patches):
-        return patches if self.tells else torch.zeros(len(patches))
+        told = patches if self.tells else torch.zeros(len(patches))
+        return torch.stack([torch.zeros(len(patches)), told], dim=1)
 
     def losses(self, patches):
         assert not self.added or not set(self.added[-1].tolist()) & set(patches.tolist())

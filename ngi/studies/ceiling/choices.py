@@ -89,13 +89,8 @@ class Predicted(Choice):
 
 def _known(training: Training, pool: CompactPatches, numbers: Tensor) -> Tensor:
     """[n, F] of patches by their numbers."""
-    parts = [chosen(pool, part) for part in numbers.split(CHUNK)]
-    return torch.cat(
-        [
-            torch.cat([training.described(part), training.disagreement(part)[:, None]], dim=1)
-            for part in parts
-        ]
-    )
+    parts = numbers.split(CHUNK)
+    return torch.cat([training.described(chosen(pool, part)) for part in parts])
 
 
 def true_errors(

@@ -9,18 +9,16 @@ from typing import Any
 import torch
 from hydra.utils import instantiate
 from omegaconf import DictConfig
-from torch import Tensor, nn
+from torch import Tensor
 
 from ngi import learn
 from ngi.clock.counters import Counters
 from ngi.config.build import build_module, training_device
 from ngi.explore import ConstantTarget
 from ngi.learn import Batch
+from ngi.learn.glimpses import sparse
 from ngi.learn.graph_trainer import GraphTrainer
 from ngi.patches import Patches
-
-PIXELS_APART = 4
-"""Of a candidate's pixels that its error is the mean over: one in 16."""
 
 
 class Training:
@@ -81,39 +79,24 @@ class Training:
 
     def losses(self, patches: Patches) -> Tensor:
         """[n] `errors` against the traced radiance, noise included."""
-        return self.errors(patches, _sparse(patches.log_radiance.float()))
+        return self.errors(patches, sparse(patches.log_radiance.float()))
 
     def described(self, patches: Patches) -> Tensor:
-        """[n, 2 C + D]: mean and deviation of the buffers at the pixels of `answers`, and v."""
-        (buffers, vectors), _ = self._samples.example(patches)
-        pixels = _sparse(buffers.float())
-        return torch.cat([pixels.mean((1, 2)), pixels.std((1, 2)), vectors.float()], dim=1)
-
-    def disagreement(self, patches: Patches) -> Tensor:
-        """[n] mean absolute differences of `answers` by present and by averaged weights.
-
-        Raises ValueError without averaged ones.
-        """
-        if self._module.averaged is None:
-            raise ValueError(
-                "averaging: a choice by what present and averaged weights disagree on needs such; "
-                "give averaging=exponential"
-            )
-        present = self._answers_of(self._module.network, patches)
-        return (present - self.answers(patches)).abs().mean(dim=(1, 2, 3))
+        """[n, F]: `learn.features` of what a glimpse of each shows."""
+        buffers, vectors = self._glimpses(patches)
+        return learn.features(buffers, vectors, self._module.disagreement(buffers, vectors)).cpu()
 
     def answers(self, patches: Patches) -> Tensor:
-        """[n, h, w, 3] log1p radiance by the averaged weights, at every fourth row and column."""
+        """[n, h, w, 3] log1p radiance by the averaged weights, at the pixels of a glimpse."""
         averaged = self._module.averaged
         network = self._module.network if averaged is None else averaged.module
-        return self._answers_of(network, patches)
-
-    def _answers_of(self, network: nn.Module, patches: Patches) -> Tensor:
-        (buffers, vectors), _ = self._samples.example(patches.to(self._device))
-        sparse = _sparse(buffers).contiguous()
         with torch.no_grad(), self._module.trainer.precision_plugin.forward_context():
-            answer: Tensor = network(sparse, vectors)
+            answer: Tensor = network(*self._glimpses(patches))
         return answer.float().cpu()
+
+    def _glimpses(self, patches: Patches) -> tuple[Tensor, Tensor]:
+        (buffers, vectors), _ = self._samples.example(patches.to(self._device))
+        return sparse(buffers).contiguous(), vectors
 
     def _step(self, batch: Batch) -> None:
         used = self._taken / self.steps
@@ -127,16 +110,11 @@ class Training:
         self._taken += 1
 
 
-def _sparse(images: Tensor) -> Tensor:
-    """[n, H, W, k] to [n, h, w, k]."""
-    return images[:, ::PIXELS_APART, ::PIXELS_APART]
-
-
 class _Answered:
     """In a stream's place, where no chains learn from the steps."""
 
     def __init__(self) -> None:
-        self.sampler = SimpleNamespace(target=ConstantTarget())
+        self.sampler = SimpleNamespace(target=ConstantTarget(), needs_description=False)
         self.clock = learn.PhaseClock()
         self.counters = Counters()
 
