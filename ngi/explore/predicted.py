@@ -186,14 +186,21 @@ class PredictedLoss:
         return torch.where(mean > 0, losses / mean, 0.0)
 
 
+def worth(known: Tensor, forest: Forest) -> Tensor:
+    """[m] of states of which [m, F] is `known`, the last number the network's disagreement there.
+
+    The predicted loss times the root of the disagreement: where that is high the network is still
+    learning, while a loss can be high by what it never learns.
+    """
+    return forest(known) * known[:, -1].sqrt()
+
+
 class PredictedFromBuffers(PredictedLoss):
     """`PredictedLoss` where patches are dear, so that there is time to look before one is traced.
 
     The forest is grown through what `describe` tells of the states (of a run: buffers, v, and how
-    far the network's present and averaged weights disagree) in place of the states themselves. What
-    a state is worth is the loss so predicted, times the root of the disagreement: where it is high
-    the network is still learning, while a loss can be high by what it never learns.
-
+    far the network's present and averaged weights disagree) in place of the states themselves, and
+    they are drawn by `worth`.
     What sets a scene up for one patch shows others of the same v, too: candidates are groups of
     `PATCHES_OF_ONE_VECTOR` that differ in the patch position.
 
@@ -226,5 +233,5 @@ class PredictedFromBuffers(PredictedLoss):
         first = candidates[::PATCHES_OF_ONE_VECTOR, :-2]
         candidates[:, :-2] = first.repeat_interleave(PATCHES_OF_ONE_VECTOR, dim=0)
         known = describe(candidates)
-        values = state.forest(known) * known[:, -1].sqrt()
+        values = worth(known, state.forest)
         return self._chosen(candidates, known, values, generator)

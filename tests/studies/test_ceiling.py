@@ -265,7 +265,7 @@ class Disagreeing(Recorder):
 
     def described(self, patches):
         told = patches if self.tells else torch.zeros(len(patches))
-        return torch.stack([torch.zeros(len(patches)), told], dim=1)
+        return torch.stack([told, torch.ones(len(patches))], dim=1)
 
     def losses(self, patches):
         assert not self.added or not set(self.added[-1].tolist()) & set(patches.tolist())

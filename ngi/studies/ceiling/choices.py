@@ -11,6 +11,7 @@ from torch import Tensor
 
 from ngi.explore import Importance
 from ngi.explore.forest import grow
+from ngi.explore.predicted import worth
 from ngi.reuse import CompactPatches
 from ngi.studies.ceiling.pool import chosen
 from ngi.studies.ceiling.training import Training
@@ -50,10 +51,10 @@ class Oracle(Choice):
 
 
 class Predicted(Choice):
-    """By the losses that a forest predicts, through those of all chosen before as they were new.
+    """As `PredictedFromBuffers` draws: by what is known of a patch before a path is traced.
 
-    Of a patch it knows what is there before a path is traced: v, mean and deviation of its buffers,
-    and how far present and averaged weights disagree on it.
+    That is v, mean and deviation of its buffers, and how far present and averaged weights disagree
+    on it. The forest is grown through the losses of all chosen before as they were new.
 
     trees, depth, smallest_leaf: see `ngi.explore.forest.grow`
     """
@@ -77,7 +78,7 @@ class Predicted(Choice):
     def values(self, candidates: Tensor, generator: torch.Generator) -> Tensor:
         seen = _known(self._training, self._pool, torch.cat(self._seen))
         forest = grow(seen, torch.cat(self._losses), generator, **self._forest)
-        return forest(_known(self._training, self._pool, candidates))
+        return worth(_known(self._training, self._pool, candidates), forest)
 
     def chose(self, numbers: Tensor) -> None:
         """Losses count relative to those of their round: later ones are lower."""
