@@ -37,6 +37,11 @@ def keys(*overrides: str, dimensions: int = 3) -> dict[str, str]:
     return {part.name: part.key for part in run_components(config, renderer=renderer)}
 
 
+def test_what_a_sampler_looks_at_is_not_counted_and_that_is_said() -> None:
+    with pytest.raises(ValueError, match=r"budget\.clock=wall"):
+        keys("method=ours_predicted_from_buffers")
+
+
 def test_samples_of_several_images_are_rendered_and_trained_on_at_a_price_of_their_own() -> None:
     image = ("renderer.patch_size=16", "resolution.start=16")
     patches = keys("method=uniform", *image)

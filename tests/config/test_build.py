@@ -6,7 +6,7 @@ import pytest
 from hydra.utils import instantiate
 
 from ngi import learn
-from ngi.config.build import build_samples, build_stream
+from ngi.config.build import build_module, build_samples, build_stream
 from ngi.config.configuration import composed
 from tests.learn.small_stream import steps
 
@@ -40,3 +40,19 @@ def test_a_reuse_policy_is_told_how_clean_patches_are_where_it_asks(
     )
     probabilities = [stream.reuse_probability for _ in steps(stream, 3)]
     assert probabilities == [0, pytest.approx(reused), pytest.approx(reused)]
+
+
+@pytest.mark.parametrize(
+    ("sampler", "described"), [("predicted_from_buffers", True), ("predicted_loss", False)]
+)
+def test_a_sampler_that_looks_at_patches_is_told_of_them(
+    sampler: str, described: bool, tmp_path: Path
+) -> None:
+    config = composed("renderer=analytic", f"sampler={sampler}", "averaging=exponential")
+    renderer = instantiate(config.renderer)
+    samples = build_samples(config, renderer=renderer)
+    stream = build_stream(
+        config, renderer=renderer, samples=samples, clock=learn.PhaseClock(), patches=tmp_path
+    )
+    build_module(config, samples=samples, stream=stream, folder=tmp_path)
+    assert isinstance(stream.describe, learn.Description) == described

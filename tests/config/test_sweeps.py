@@ -16,6 +16,7 @@ from tests.config.command_line import composed
 BUDGETS = ("smoke", "small", "paper")
 SWEEPS = [file.stem for file in sorted((root() / "sweeps").glob("*.yaml"))]
 OF_ONE_SIZE = (
+    "dear",
     "demo",
     "learner",
     "minute",
@@ -46,7 +47,7 @@ def test_every_scene_of_a_sweep_is_there(sweep: str) -> None:
         assert name_of(scene, *own_words(sweep)) == scene
 
 
-@pytest.mark.parametrize("sweep", ["minute", "ours_hour", "rare"])
+@pytest.mark.parametrize("sweep", ["dear", "minute", "ours_hour", "rare"])
 def test_runs_of_these_are_not_in_the_way_of_plain_ones(sweep: str) -> None:
     folders = [
         composed(*words, "scene=mirror", "method=ours").run.folder

@@ -182,6 +182,35 @@ def test_after_each_step_the_average_follows_and_is_what_predicts() -> None:
     assert not torch.equal(made.network.render(*inputs).float(), expected)
 
 
+def test_present_and_averaged_weights_disagree_on_each_image_by_itself() -> None:
+    """Before the first step nowhere."""
+    made = module(Loss(), averaging=partial(exponential_average, decay=0.98))
+    made._trainer = SimpleNamespace(  # type: ignore[assignment]
+        precision_plugin=SimpleNamespace(forward_context=nullcontext)
+    )
+    batch = Batch(patches(4, 0), torch.arange(4), False, None)
+    inputs, _ = patch_example(batch.patches)
+    assert made.disagreement(*inputs).tolist() == [0.0] * 4
+    optimizer = made.configure_optimizers()
+    for _ in range(3):
+        training_step(batch, made.learner, optimizer=optimizer)
+    found = made.disagreement(*inputs)
+    assert made.averaged is not None
+    for one, (buffers, vector) in zip(found, zip(*inputs, strict=True), strict=True):
+        present, averaged = (
+            network.render(buffers, vector) for network in (made.network, made.averaged.module)
+        )
+        expected = (present - averaged).abs().mean()
+        torch.testing.assert_close(one.double(), expected.detach(), rtol=1e-4, atol=1e-7)
+    assert len(found.unique()) == 4
+
+
+def test_without_averaged_weights_nothing_disagrees() -> None:
+    inputs, _ = patch_example(patches(2, 0))
+    with pytest.raises(ValueError, match="averaging=exponential"):
+        module(Loss()).disagreement(*inputs)
+
+
 def test_initial_weights_depend_on_the_seed_alone() -> None:
     def weights(seed: int) -> torch.Tensor:
         torch.rand(7)  # whatever the global generator did before
