@@ -41,10 +41,12 @@ def configuration(folder: Path, *overrides: str) -> DictConfig:
 
 def test_every_run_of_a_small_study_is_done_once_and_repeats(tmp_path: Path) -> None:
     first = pd.read_csv(campaign.run_all(configuration(tmp_path / "a")))
-    assert list(first["choice"]) == ["uniform", "oracle", "predicted", "oracle_weighted", "uniform"]
-    assert list(first["patches"]) == [16, 16, 16, 16, 64]
+    assert list(first["choice"]) == [
+        *("uniform", "oracle", "oracle_cubed", "predicted", "oracle_weighted", "uniform")
+    ]
+    assert list(first["patches"]) == [16, 16, 16, 16, 16, 64]
     assert (first[["hard_error", "uniform_error", "hard_tail"]] > 0).all(axis=None)
-    assert first["hard_error"].nunique() == 5
+    assert first["hard_error"].nunique() == 5  # of errors so much alike cubes choose the same
     assert (first["hard_relmse"] > 0).all()  # there is no noise, and much to learn
     files = sorted((tmp_path / "a" / "runs").iterdir())
     before = [file.stat().st_mtime_ns for file in files]
