@@ -20,7 +20,7 @@ NEWER_SHARE = 1 / 8
 SEEN_TOGETHER = 64
 """Losses that the network had as much training for, roughly."""
 
-PATCHES_OF_ONE_VECTOR = 8
+PATCHES_OF_ONE_VECTOR = 4
 """Of a batch's candidates, where they are looked at."""
 
 
@@ -202,20 +202,28 @@ class PredictedFromBuffers(PredictedLoss):
     far the network's present and averaged weights disagree) in place of the states themselves, and
     they are drawn by `worth`.
     What sets a scene up for one patch shows others of the same v, too: candidates are groups of
-    `PATCHES_OF_ONE_VECTOR` that differ in the patch position.
+    `PATCHES_OF_ONE_VECTOR` that differ in the patch position. Of each group at most one is
+    rendered: patches of one v are much alike, and where few can be had that is what they are not to
+    be.
 
-    candidates: per batch, at least n and a multiple of that number
+    candidates: per batch, at least n times that number, and a multiple of it
+    importance: without weights, for of patches chosen in two steps they are not known
     """
 
     needs_description = True
 
-    def __init__(self, *, chains: int, candidates: int, **others: Any) -> None:
-        super().__init__(chains=chains, candidates=candidates, **others)
-        if candidates % PATCHES_OF_ONE_VECTOR:
+    def __init__(
+        self, *, chains: int, candidates: int, importance: Importance, **others: Any
+    ) -> None:
+        super().__init__(chains=chains, candidates=candidates, importance=importance, **others)
+        least = chains * PATCHES_OF_ONE_VECTOR
+        if candidates % PATCHES_OF_ONE_VECTOR or candidates < least:
             raise ValueError(
-                f"sampler.candidates: {candidates}: give a multiple of {PATCHES_OF_ONE_VECTOR}, "
-                "for candidates are patches of so many positions in the image of each scene vector"
+                f"sampler.candidates: {candidates}: give a multiple of {PATCHES_OF_ONE_VECTOR} and "
+                f"at least {least}: so many are of one scene vector, of which one is chosen"
             )
+        if importance.weighted:
+            raise ValueError("sampler.importance.weighted: true: weights are not known; give false")
         self._newer_share = 0.0  # a forest grows in no time, beside paths
         self._seen_together = 2 * chains
 
@@ -234,4 +242,11 @@ class PredictedFromBuffers(PredictedLoss):
         candidates[:, :-2] = first.repeat_interleave(PATCHES_OF_ONE_VECTOR, dim=0)
         known = describe(candidates)
         values = worth(known, state.forest)
-        return self._chosen(candidates, known, values, generator)
+        best = self._one_of_each(values.view(-1, PATCHES_OF_ONE_VECTOR), generator)
+        return self._chosen(candidates[best], known[best], values[best], generator)
+
+    def _one_of_each(self, values: Tensor, generator: torch.Generator) -> Tensor:
+        """[g] candidates, one of each group, drawn by their values [g, k]."""
+        first = torch.arange(0, values.numel(), values.shape[1])
+        drawn = [self._importance.draw(group, 1, generator)[0] for group in values]
+        return first + torch.cat(drawn)

@@ -17,8 +17,11 @@ from ngi.scene.variable_scene import VariableScene
 SHINY = 0.1
 """Roughness (alpha) up to which a surface gathers light into caustics."""
 
+WORTH_A_LOOK = 200
+"""Samples per pixel from which on a patch's buffers cost next to nothing beside its paths."""
+
 DEAR = 1000
-"""Samples per pixel from which on the number of patches decides, and no choice of them."""
+"""Samples per pixel from which on the number of patches decides more than any choice of them."""
 
 MOVES = (Translation, Rotation, Direction, KeyFrames)
 
@@ -26,17 +29,22 @@ MOVES = (Translation, Rotation, Direction, KeyFrames)
 def sampling_advice(scene: VariableScene, materials: list[Material]) -> list[str]:
     """One line or more: the sampler, and the reason.
 
-    Chosen by its true error, no patch gained anything that could be measured over a Sobol sequence
-    on the paper's scenes. What is rare is the exception: what a light does that moves, goes out or
-    is shut out, alone or through what is smooth enough for caustics.
+    Where the error is everywhere and patches are cheap, no choice is worth what it costs. What is
+    rare is one exception: what a light does that moves, goes out or is shut out, alone or through
+    what is smooth enough for caustics. Patches that take long to trace are the other.
     """
-    lines = ["sampler=sobol: where the error is everywhere no choice of patches gains anything"]
+    lines = ["sampler=sobol: where the error is everywhere and patches are cheap, it is the best"]
     if causes := _rare(scene, materials):
         lines.append(
             f"method=ours_eager, where {CONCENTRATED:.0%} and more of a pilot run's loss is on "
             f"the worst 5% of its patches: {'; '.join(causes)}"
         )
     spp = scene.description.samples_per_pixel
+    if spp >= WORTH_A_LOOK:
+        lines.append(
+            f"method=ours_predicted_from_buffers, where patches have the scene's {spp} samples per "
+            "pixel (budget=scarce): their buffers tell which ones to trace"
+        )
     if spp >= DEAR:
         lines.append(
             f"samples per pixel as budget=machine or budget=hour have them instead of {spp}: more "

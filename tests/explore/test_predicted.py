@@ -230,9 +230,10 @@ def test_candidates_are_patches_of_a_few_images() -> None:
 
     found = looking()
     proposals = found.propose(found.init(5), torch.Generator(), batch=0, describe=describe)
-    groups = asked[0].unflatten(0, (8, 8))
+    groups = asked[0].unflatten(0, (16, 4))
     assert (groups[:, :, :-2] == groups[:, :1, :-2]).all()
-    assert len(groups[:, 0, :-2].unique(dim=0)) == 8
+    assert len(groups[:, 0, :-2].unique(dim=0)) == 16
+    assert len(proposals.position[:, :-2].unique(dim=0)) == CHAINS
     assert len(asked[0][:, -2:].unique(dim=0)) == 64
     assert all((asked[0] == state).all(dim=1).any() for state in proposals.position)
 
@@ -245,9 +246,30 @@ def test_a_sampler_that_looks_needs_somebody_who_tells() -> None:
         found.propose(found.init(5), torch.Generator(), batch=0)
 
 
-def test_candidates_that_are_no_groups_are_refused() -> None:
-    with pytest.raises(ValueError, match=r"sampler\.candidates: 60: give a multiple of 8"):
-        looking(candidates=60)
+@pytest.mark.parametrize("candidates", [12, 62])
+def test_candidates_that_are_no_groups_are_refused(candidates: int) -> None:
+    named = rf"sampler\.candidates: {candidates}: give a multiple of 4 and at least 16"
+    with pytest.raises(ValueError, match=named):
+        looking(candidates=candidates)
+
+
+def test_weights_that_nobody_knows_are_refused() -> None:
+    with pytest.raises(ValueError, match=r"sampler\.importance\.weighted"):
+        looking(importance=Importance(uniform_share=0.5, weighted=True))
+
+
+def test_of_patches_of_one_image_the_better_are_drawn() -> None:
+    """In proportion to the power, and each by itself as likely as its share says."""
+
+    def describe(states: torch.Tensor) -> torch.Tensor:
+        return torch.tensor([1.0, 2.0, 3.0, 4.0]).repeat(len(states) // 4)[:, None]
+
+    found = looking(candidates=4 * CHAINS, importance=Importance(uniform_share=0.0, power=2.0))
+    state, generator = found.init(3), torch.Generator().manual_seed(7)
+    known = [found.propose(state, generator, batch=0, describe=describe).known for _ in range(1000)]
+    drawn = torch.cat([each for each in known if each is not None]).flatten().long()
+    shares = drawn.bincount()[1:] / len(drawn)  # of values that are roots: 1 to 4, as they are
+    assert shares.tolist() == pytest.approx([0.1, 0.2, 0.3, 0.4], abs=0.025)
 
 
 @pytest.mark.parametrize(

@@ -140,7 +140,7 @@ def test_the_sampler_is_told_of_its_candidates_at_their_resolution(tmp_path: Pat
     assert len(asked) == found.counters.proposed_batches >= len(generated)
     for batch, (looked_at, resolution) in zip(generated, asked, strict=False):
         assert resolution == 24
-        assert looked_at[:, :-2].unique(dim=0).shape[0] == 2
+        assert looked_at[:, :-2].unique(dim=0).shape[0] == 4
         chosen = torch.cat([batch.patches.scene_vector, batch.patches.position], dim=1)
         assert all((looked_at == state).all(dim=1).any() for state in chosen)
 

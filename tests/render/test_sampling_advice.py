@@ -89,6 +89,14 @@ def test_smooth_surfaces_make_caustics_of_it(advice, ball, variables, caustics) 
     assert ("smooth surfaces make caustics" in text) == caustics
 
 
+@pytest.mark.parametrize(("samples", "looks"), [(64, False), (199, False), (200, True)])
+def test_patches_that_take_long_are_looked_at_first(advice, samples: int, looks: bool) -> None:
+    text = advice(PAINT, samples=samples)
+    assert (
+        f"method=ours_predicted_from_buffers, where patches have the scene's {samples} " in text
+    ) == looks
+
+
 def test_where_patches_are_dear_more_of_them_come_first(advice) -> None:
     assert "as budget=machine or budget=hour have them instead of 24000" in advice(
         PAINT, samples=24000
