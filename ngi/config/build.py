@@ -92,7 +92,7 @@ def build_module(
         averaging=instantiate(config.averaging),
     )
     if stream.sampler.needs_description:
-        stream.describe = learn.Description(samples=samples, disagreement=module.disagreement)
+        stream.description = learn.Description(samples=samples, answers=module.answers)
     return module
 
 

@@ -34,7 +34,7 @@ The last number, at least 0, is how far from settled the network is there, in un
 """
 
 
-def nothing_known(states: Tensor, *_: object) -> Tensor:
+def nothing_known(states: Tensor) -> Tensor:
     """The `Describe` of a run that has none: RuntimeError."""
     raise RuntimeError(f"{len(states)} states are to be described, and nobody said what by")
 

@@ -1,5 +1,7 @@
-"""What is known of a patch before its paths are traced: buffers, v, and what the network makes of
-both. Predictions of losses are made from it where patches are dear (`ngi.explore.PredictedLoss`).
+"""What is known of a patch before its paths are traced, and what the network was wrong about after.
+
+Where patches are dear, losses are predicted from the first by the second
+(`ngi.explore.PredictedFromBuffers`).
 """
 
 from collections.abc import Callable
@@ -7,10 +9,13 @@ from collections.abc import Callable
 import torch
 from torch import Tensor
 
+from ngi.explore import Describe
+from ngi.learn.glimpses import sparse
 from ngi.learn.samples import Samples
+from ngi.patches import Patches
 
-Disagreement = Callable[..., Tensor]
-"""[n] of the network's inputs, see `IlluminationModule.disagreement`."""
+Answers = Callable[..., tuple[Tensor, Tensor]]
+"""See `IlluminationModule.answers`."""
 
 
 class Description:
@@ -20,17 +25,31 @@ class Description:
     which patches there is more to learn than in others, and nothing by its size.
     """
 
-    def __init__(self, *, samples: Samples, disagreement: Disagreement) -> None:
+    def __init__(self, *, samples: Samples, answers: Answers) -> None:
         self._samples = samples
-        self._disagreement = disagreement
+        self._answers = answers
 
-    def __call__(self, states: Tensor, resolution: int) -> Tensor:
-        """[n, F] of states [n, D + 2], of patches of an image with so many pixels a side."""
+    def at(self, resolution: int) -> Describe:
+        """Of states [n, D + 2] the features [n, F], in an image of so many pixels a side."""
+        return lambda states: self._features(states, resolution)
+
+    def _features(self, states: Tensor, resolution: int) -> Tensor:
         buffers, vectors = self._samples.glimpses(states, resolution=resolution)
-        found = self._disagreement(buffers, vectors).float().cpu()
-        mean = found.mean()
-        relative = found / mean if mean > 0 else torch.ones_like(found)
+        disagreement = distances(*self._answers(buffers, vectors))
+        mean = disagreement.mean()
+        relative = disagreement / mean if mean > 0 else torch.ones_like(disagreement)
         return features(buffers, vectors, relative).cpu()
+
+    def errors(self, patches: Patches) -> Tensor:
+        """[n] `distances` of the averaged network's answers to traced radiance, in a glimpse."""
+        (buffers, vectors), log_radiance = self._samples.example(patches)
+        _, averaged = self._answers(sparse(buffers).contiguous(), vectors)
+        return distances(averaged, sparse(log_radiance).float().cpu())
+
+
+def distances(one: Tensor, other: Tensor) -> Tensor:
+    """[n] mean absolute differences of images [n, h, w, 3] of log1p radiance."""
+    return (one - other).abs().mean(dim=(1, 2, 3))
 
 
 def features(buffers: Tensor, vectors: Tensor, disagreement: Tensor) -> Tensor:

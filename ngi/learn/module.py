@@ -132,11 +132,11 @@ class IlluminationModule(LightningModule):
             output: Tensor = self._image(*on_device)[0]
         return output.float().cpu()
 
-    def disagreement(self, *inputs: Tensor) -> Tensor:
-        """[n] mean absolute differences of log1p radiance by present and by averaged weights.
+    def answers(self, *inputs: Tensor) -> tuple[Tensor, Tensor]:
+        """Log1p radiance [n, H, W, 3] by present and by averaged weights, float32 on the CPU.
 
-        inputs: the network's of [n] images, on any device. On the CPU. Raises ValueError where no
-        weights are averaged.
+        inputs: the network's, of [n] images, on any device. Raises ValueError where no weights are
+        averaged.
         """
         if self.averaged is None:
             raise ValueError(
@@ -146,8 +146,7 @@ class IlluminationModule(LightningModule):
         on_device = [tensor.to(self.device) for tensor in inputs]
         with torch.no_grad(), self.trainer.precision_plugin.forward_context():
             present, averaged = self.network(*on_device), self.averaged.module(*on_device)
-        difference: Tensor = present.float() - averaged.float()
-        return difference.abs().mean(dim=(1, 2, 3)).cpu()
+        return present.float().cpu(), averaged.float().cpu()
 
     def signals(self, patches: Patches, target: Target) -> Signals:
         """What `target` requires of [n] patches under the present weights and moments.

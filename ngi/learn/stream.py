@@ -22,6 +22,7 @@ from ngi.explore import ChainInfo, ChainState, ResolutionSchedule, Sampler, noth
 from ngi.learn.ahead import ProposalsAhead
 from ngi.learn.batch import ENDLESS, Batch, Feedback
 from ngi.learn.chain_trace import chain_record, chain_row
+from ngi.learn.description import Description
 from ngi.learn.new_losses import NewLosses
 from ngi.learn.samples import Samples
 from ngi.learn.saved_stores import SavedStores
@@ -70,7 +71,7 @@ class TrainingStream:
         self.new_losses = NewLosses()
         self.reuse_probability = 0.0
         self.chain_record: dict[str, np.ndarray] | None = None  # of a generated batch
-        self.describe: Callable[..., torch.Tensor] = nothing_known  # see `Description`
+        self.description: Description | None = None  # of states, for samplers that need it
         self._chain_info: ChainInfo | None = None
         self._samples = samples
         self._policy = reuse.policy
@@ -151,10 +152,7 @@ class TrainingStream:
             "reuse_probability": self.reuse_probability,
             "loss_new": self._policy_state.new_loss,
             "loss_existing": self._policy_state.existing_loss,
-            "store_size": len(self.store),
-            "store_mean_age": self.store.mean_age,
-            "store_mean_loss": self.store.mean_loss,
-            "non_finite_losses": self.store.non_finite_losses,
+            **self.store.log_row(),
             "resolution": self._resolution,
             **vars(self.counters),
             **chain_row(self._chain_info),
@@ -217,7 +215,7 @@ class TrainingStream:
                     self.chains,
                     self._generator,
                     batch=self.counters.proposed_batches,
-                    describe=lambda states: self.describe(states, resolution),
+                    describe=self.description.at(resolution) if self.description else nothing_known,
                 )
                 seed = int(torch.randint(2**31, (), generator=self._generator))
                 self._ahead = ProposalsAhead(proposals, resolution=resolution, seed=seed)
@@ -280,6 +278,7 @@ class TrainingStream:
     def _accept(self, batch: Batch, feedback: Feedback) -> None:
         assert self._ahead is not None
         unscored = torch.zeros(self.sampler.chains)  # looked at by no rule
+        losses = self.new_losses.add(feedback.losses.detach().float().cpu(), feedback.noise)
         proposed, current = feedback.target_proposed, feedback.target_current
         self.chains, self._chain_info = self.sampler.accept(
             self.chains,
@@ -288,7 +287,7 @@ class TrainingStream:
             target_current=unscored if current is None else current,
             target_proposed=unscored if proposed is None else proposed,
             generator=self._generator,
-            losses=self.new_losses.add(feedback.losses.detach().float().cpu(), feedback.noise),
+            losses=losses if self.description is None else self.description.errors(batch.patches),
         )
         self.chain_record = chain_record(
             self._ahead.proposals,

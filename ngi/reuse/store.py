@@ -101,6 +101,15 @@ class PatchStore:
         """How many NaN or infinite losses were recorded, as 0, so far."""
         return self._non_finite_losses
 
+    def log_row(self) -> dict[str, float | int | None]:
+        """What is logged with every step."""
+        return {
+            "store_size": len(self),
+            "store_mean_age": self.mean_age,
+            "store_mean_loss": self.mean_loss,
+            "non_finite_losses": self.non_finite_losses,
+        }
+
     def add(self, patches: Patches, weights: Tensor | None = None) -> Tensor:
         """Stores n patches and returns their ids, [n] int64, consecutive.
 

@@ -9,9 +9,10 @@ import pytest
 import torch
 from torch import Tensor
 
-from ngi.explore import Importance, PredictedFromBuffers, PredictedLoss
+from ngi.explore import Importance, PredictedFromBuffers
 from ngi.learn import Description, PatchSamples, Samples, TrainingStream, features
 from ngi.learn.glimpses import PIXELS_APART, glimpsed_buffers
+from ngi.patches import Patches
 from ngi.render import AnalyticRenderer
 from ngi.reuse import Epochs
 from tests.learn.comparison import assert_same
@@ -91,25 +92,56 @@ def test_features_are_mean_and_deviation_of_each_channel() -> None:
 @pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
 def test_disagreement_counts_relative_to_its_mean(scale: float) -> None:
     given = torch.tensor([1.0, 2.0, 6.0])
-    description = Description(
-        samples=PatchSamples(renderer=renderer()), disagreement=lambda *_: scale * given
-    )
-    found = description(states(3), SIDE)
+    found = description(scale * given).at(SIDE)(states(3))
     torch.testing.assert_close(found[:, -1], given / 3)
 
 
 def test_weights_that_agree_everywhere_tell_nothing() -> None:
     """As before the first step: no NaN."""
-    description = Description(
-        samples=PatchSamples(renderer=renderer()), disagreement=lambda *_: torch.zeros(3)
+    assert description(torch.zeros(3)).at(SIDE)(states(3))[:, -1].tolist() == [1.0, 1.0, 1.0]
+
+
+def test_errors_are_those_of_the_averaged_weights_at_few_pixels() -> None:
+    """An answer that is too high by a constant of each patch, whatever the other weights say."""
+    patches = make_patches(states(3))
+    sparse = patches.log_radiance[:, ::PIXELS_APART, ::PIXELS_APART]
+    too_high = torch.tensor([0.5, -2.0, 0.0])
+
+    def answers(buffers: Tensor, vectors: Tensor) -> tuple[Tensor, Tensor]:
+        assert torch.equal(buffers, patches.buffers[:, ::PIXELS_APART, ::PIXELS_APART])
+        assert torch.equal(vectors, patches.scene_vector)
+        return torch.full_like(sparse, 7.0), sparse + too_high[:, None, None, None]
+
+    found = Description(samples=PatchSamples(renderer=renderer()), answers=answers).errors(patches)
+    torch.testing.assert_close(found, torch.tensor([0.5, 2.0, 0.0]))
+
+
+def make_patches(looked_at: Tensor) -> Patches:
+    rendered = renderer().render_patches(looked_at, resolution=SIDE, seed=0)
+    return Patches(
+        scene_vector=looked_at[:, :-2],
+        position=looked_at[:, -2:],
+        resolution=torch.full((len(looked_at),), SIDE),
+        large_step=torch.ones(len(looked_at), dtype=torch.bool),
+        buffers=rendered.buffers,
+        log_radiance=rendered.log_radiance,
     )
-    assert description(states(3), SIDE)[:, -1].tolist() == [1.0, 1.0, 1.0]
 
 
-def stream(folder: Path, *, described: bool = True) -> TrainingStream:
-    """Whose disagreement is told by a buffer."""
+def description(disagreement: Tensor) -> Description:
+    """Of weights that disagree by so much on each of [n] images."""
+
+    def answers(buffers: Tensor, _: Tensor) -> tuple[Tensor, Tensor]:
+        averaged = torch.zeros(*buffers.shape[:3], 3)
+        return averaged - disagreement[:, None, None, None], averaged
+
+    return Description(samples=PatchSamples(renderer=renderer()), answers=answers)
+
+
+def stream(folder: Path) -> TrainingStream:
+    """Whose weights disagree where a buffer says so."""
     made = renderer()
-    sampler = (PredictedFromBuffers if described else PredictedLoss)(
+    sampler = PredictedFromBuffers(
         chains=CHAINS,
         candidates=16,
         importance=Importance(uniform_share=0.0, power=4.0),
@@ -119,23 +151,26 @@ def stream(folder: Path, *, described: bool = True) -> TrainingStream:
         smallest_leaf=1,
     )
     found = make(folder, sampler=sampler, renderer=made, rule=Epochs())
-    found.describe = Description(
+    found.description = Description(
         samples=PatchSamples(renderer=made),
-        disagreement=lambda buffers, _: buffers.mean(dim=(1, 2, 3)),
+        answers=lambda buffers, _: (buffers[..., :3], torch.zeros_like(buffers[..., :3])),
     )
     return found
 
 
 def test_the_sampler_is_told_of_its_candidates_at_their_resolution(tmp_path: Path) -> None:
     asked: list[Any] = []
+
+    class Asked(PatchSamples):
+        def glimpses(self, states: Tensor, *, resolution: int) -> tuple[Tensor, ...]:
+            asked.append((states, resolution))
+            return super().glimpses(states, resolution=resolution)
+
     found = stream(tmp_path)
-    inner = found.describe
-
-    def describe(looked_at: Tensor, resolution: int) -> Tensor:
-        asked.append((looked_at, resolution))
-        return inner(looked_at, resolution)
-
-    found.describe = describe
+    found.description = Description(
+        samples=Asked(renderer=renderer()),
+        answers=lambda buffers, _: (buffers[..., :3], torch.zeros_like(buffers[..., :3])),
+    )
     generated = [batch for batch in steps(found, 20) if batch.generated]
     assert len(asked) == found.counters.proposed_batches >= len(generated)
     for batch, (looked_at, resolution) in zip(generated, asked, strict=False):
@@ -145,15 +180,17 @@ def test_the_sampler_is_told_of_its_candidates_at_their_resolution(tmp_path: Pat
         assert all((looked_at == state).all(dim=1).any() for state in chosen)
 
 
-def test_a_sampler_that_does_not_ask_is_told_nothing(tmp_path: Path) -> None:
-    found = stream(tmp_path, described=False)
-    found.describe = lambda *_: pytest.fail("asked")
-    assert sum(batch.generated for batch in steps(found, 12)) > 2
+def test_the_sampler_learns_from_errors_in_place_of_training_losses(tmp_path: Path) -> None:
+    found = stream(tmp_path)
+    assert found.description is not None
+    generated = [batch.patches for batch in steps(found, 12) if batch.generated]
+    expected = torch.cat([found.description.errors(patches) for patches in generated])
+    assert torch.equal(found.chains.loss, expected)  # type: ignore[attr-defined]
 
 
 def test_without_anybody_who_tells_a_run_ends_at_once(tmp_path: Path) -> None:
     found = stream(tmp_path)
-    found.describe = make(tmp_path / "other").describe
+    found.description = None
     with pytest.raises(RuntimeError, match="nobody said what by"):
         next(iter(found))
 

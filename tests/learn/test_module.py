@@ -182,7 +182,7 @@ def test_after_each_step_the_average_follows_and_is_what_predicts() -> None:
     assert not torch.equal(made.network.render(*inputs).float(), expected)
 
 
-def test_present_and_averaged_weights_disagree_on_each_image_by_itself() -> None:
+def test_answers_are_those_of_present_and_of_averaged_weights() -> None:
     """Before the first step nowhere."""
     made = module(Loss(), averaging=partial(exponential_average, decay=0.98))
     made._trainer = SimpleNamespace(  # type: ignore[assignment]
@@ -190,25 +190,24 @@ def test_present_and_averaged_weights_disagree_on_each_image_by_itself() -> None
     )
     batch = Batch(patches(4, 0), torch.arange(4), False, None)
     inputs, _ = patch_example(batch.patches)
-    assert made.disagreement(*inputs).tolist() == [0.0] * 4
+    present, averaged = made.answers(*inputs)
+    assert torch.equal(present, averaged)
     optimizer = made.configure_optimizers()
     for _ in range(3):
         training_step(batch, made.learner, optimizer=optimizer)
-    found = made.disagreement(*inputs)
     assert made.averaged is not None
-    for one, (buffers, vector) in zip(found, zip(*inputs, strict=True), strict=True):
-        present, averaged = (
-            network.render(buffers, vector) for network in (made.network, made.averaged.module)
-        )
-        expected = (present - averaged).abs().mean()
-        torch.testing.assert_close(one.double(), expected.detach(), rtol=1e-4, atol=1e-7)
-    assert len(found.unique()) == 4
+    for found, network in zip(
+        made.answers(*inputs), (made.network, made.averaged.module), strict=True
+    ):
+        assert found.dtype == torch.float32
+        expected = torch.stack([network.render(*one) for one in zip(*inputs, strict=True)])
+        torch.testing.assert_close(found, expected.detach().float(), rtol=1e-4, atol=1e-6)
 
 
-def test_without_averaged_weights_nothing_disagrees() -> None:
+def test_without_averaged_weights_nothing_is_answered_by_them() -> None:
     inputs, _ = patch_example(patches(2, 0))
     with pytest.raises(ValueError, match="averaging=exponential"):
-        module(Loss()).disagreement(*inputs)
+        module(Loss()).answers(*inputs)
 
 
 def test_initial_weights_depend_on_the_seed_alone() -> None:

@@ -75,7 +75,7 @@ class Training:
 
         truth: [n, h, w, 3], at the pixels of `answers`
         """
-        return (self.answers(patches) - truth).abs().mean(dim=(1, 2, 3))
+        return learn.distances(self.answers(patches), truth)
 
     def losses(self, patches: Patches) -> Tensor:
         """[n] `errors` against the traced radiance, noise included."""
@@ -84,7 +84,8 @@ class Training:
     def described(self, patches: Patches) -> Tensor:
         """[n, F]: `learn.features` of what a glimpse of each shows."""
         buffers, vectors = self._glimpses(patches)
-        return learn.features(buffers, vectors, self._module.disagreement(buffers, vectors)).cpu()
+        disagreement = learn.distances(*self._module.answers(buffers, vectors))
+        return learn.features(buffers, vectors, disagreement).cpu()
 
     def answers(self, patches: Patches) -> Tensor:
         """[n, h, w, 3] log1p radiance by the averaged weights, at the pixels of a glimpse."""
