@@ -201,6 +201,7 @@ class PredictedFromBuffers(PredictedLoss):
     The forest is grown through what `describe` tells of the states (of a run: buffers, v, and how
     far the network's present and averaged weights disagree) in place of the states themselves, and
     they are drawn by `worth`.
+
     What sets a scene up for one patch shows others of the same v, too: candidates are groups of
     `PATCHES_OF_ONE_VECTOR` that differ in the patch position. Of each group at most one is
     rendered: patches of one v are much alike, and where few can be had that is what they are not to
@@ -235,7 +236,7 @@ class PredictedFromBuffers(PredictedLoss):
         batch: int,
         describe: Describe = nothing_known,
     ) -> Proposals:
-        """See `PredictedLoss.propose`."""
+        """A batch of states, drawn by disagreement alone as long as fewer than 2 n were seen."""
         shape = self._candidates, state.position.shape[1]
         candidates = torch.empty(shape).uniform_(generator=generator)
         first = candidates[::PATCHES_OF_ONE_VECTOR, :-2]

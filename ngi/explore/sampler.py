@@ -39,7 +39,11 @@ class Sampler(Protocol):
         batch: int,
         describe: Describe = nothing_known,
     ) -> Proposals:
-        """The n states to render next. batch: how often the run has proposed before."""
+        """The n states to render next.
+
+        batch: how often the run has proposed before
+        describe: asked where `needs_description`
+        """
         ...
 
     def accept(
