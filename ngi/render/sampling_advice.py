@@ -31,9 +31,10 @@ def sampling_advice(scene: VariableScene, materials: list[Material]) -> list[str
 
     Where the error is everywhere and patches are cheap, no choice is worth what it costs. What is
     rare is one exception: what a light does that moves, goes out or is shut out, alone or through
-    what is smooth enough for caustics. Patches that take long to trace are the other.
+    what is smooth enough for caustics. Patches that take long to trace can be the other, where the
+    error is in few of them.
     """
-    lines = ["sampler=sobol: where the error is everywhere and patches are cheap, it is the best"]
+    lines = ["sampler=sobol: the best known where the error is everywhere and patches are cheap"]
     if causes := _rare(scene, materials):
         lines.append(
             f"method=ours_eager, where {CONCENTRATED:.0%} and more of a pilot run's loss is on "
@@ -42,8 +43,8 @@ def sampling_advice(scene: VariableScene, materials: list[Material]) -> list[str
     spp = scene.description.samples_per_pixel
     if spp >= WORTH_A_LOOK:
         lines.append(
-            f"method=ours_predicted_from_buffers, where patches have the scene's {spp} samples per "
-            "pixel (budget=scarce): their buffers tell which ones to trace"
+            f"method=ours_predicted_from_buffers is worth a try with the scene's {spp} samples per "
+            "pixel (budget=scarce): buffers tell which patches to trace"
         )
     if spp >= DEAR:
         lines.append(
