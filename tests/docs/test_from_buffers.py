@@ -98,6 +98,25 @@ def test_what_runs_end_with_is_what_their_table_says() -> None:
     ]
 
 
+def test_the_readme_says_what_the_page_says() -> None:
+    runs, looked = of_the_study(), of_runs("scarce", "bathroom")
+    hard = geometric_mean(looked, "hard")
+    expected = [
+        change(runs, scene, "predicted", error, of_choice(runs, scene, "predicted", error).index)
+        for scene in ("bathroom", "living-room")
+        for error in ("hard_error", "hard_tail")
+    ]
+    expected.append(
+        as_shown(difference_of(hard.loc["ours_uniform"], hard.loc[LOOKING])).split(" %")[0]
+    )
+    number = r"(\d+\.\d) % ± (\d+\.\d)"
+    pattern = rf"of bathroom have {number} less .+? and {number} less on their worst"
+    pattern += rf".+?of living-room {number} and {number} less; .+? end with {number} less"
+    shown = said("README.md", pattern)
+    pairs = zip(shown[::2], shown[1::2], strict=True)
+    assert [f"−{mean} ± {interval}" for mean, interval in pairs] == expected
+
+
 def test_looking_takes_the_share_of_the_time_that_is_said() -> None:
     looking = of_runs("scarce", "bathroom").loc[LOOKING]
     shares = 100 * looking["explore_seconds"] / looking["run_seconds"]
