@@ -23,7 +23,10 @@ from analysis.tables import TITLES
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Okabe and Ito's colours, told apart by colour-blind readers too; yellow is too faint here."""
 
-DASHES = ("-", (0, (5, 1.5)), (0, (1, 1.2)), (0, (6, 1.5, 1, 1.5)), (0, (3, 1, 1, 1, 1, 1)))
+DASHES = (
+    *("-", (0, (5, 1.5)), (0, (1, 1.2))),
+    *((0, (6, 1.5, 1, 1.5)), (0, (3, 1, 1, 1, 1, 1)), (0, (9, 2, 3, 2))),
+)
 """From the eighth method on, colours come again with another line style."""
 
 LOG_RATIO = 4.0

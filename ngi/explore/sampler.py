@@ -60,6 +60,7 @@ class Sampler(Protocol):
         """The state once they are rendered: see `MarkovChains.accept`.
 
         losses: [n], the proposals' losses before the network was trained on them, without their
-            noise where it is known
+            noise where it is known; where `needs_description`, what the averaged weights are wrong
+            about just after (`ngi.learn.Description.errors`)
         """
         ...
