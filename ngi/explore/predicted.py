@@ -122,12 +122,7 @@ class PredictedLoss:
         """A batch of states, uniform ones as long as fewer than 2 n were seen."""
         shape = self._candidates, state.position.shape[1]
         candidates = torch.empty(shape).uniform_(generator=generator)
-        return self._chosen(candidates, candidates, state.forest(candidates), generator)
-
-    def _chosen(
-        self, candidates: Tensor, known: Tensor, values: Tensor, generator: torch.Generator
-    ) -> Proposals:
-        """As many candidates [m, S] as a batch has, drawn by their values [m]; known: [m, F]."""
+        candidates, known, values = self._valued(state, candidates, describe, generator)
         chosen, weights = self._importance.draw(values, self.chains, generator)
         return Proposals(
             position=candidates[chosen],
@@ -135,6 +130,16 @@ class PredictedLoss:
             weight=weights.float() if self._importance.weighted else None,
             known=known[chosen],
         )
+
+    def _valued(
+        self,
+        state: PredictedState,
+        uniform: Tensor,
+        describe: Describe,
+        generator: torch.Generator,
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        """Candidates [k, S] of uniform states [m, S], what is known of them [k, F], values [k]."""
+        return uniform, uniform, state.forest(uniform)
 
     def accept(
         self,
@@ -155,8 +160,7 @@ class PredictedLoss:
         newer = state.newer + finite.sum()
         forest = state.forest
         if len(seen) >= 2 * self.chains and newer >= self._newer_share * len(seen):
-            losses = self._of_their_time(loss)
-            forest = grow(seen, losses, generator, **self._forest)
+            forest = grow(seen, self._of_their_time(loss), generator, **self._forest)
             newer = torch.tensor(0)
         moved = replace(
             state,
@@ -228,23 +232,21 @@ class PredictedFromBuffers(PredictedLoss):
         self._newer_share = 0.0  # a forest grows in no time, beside paths
         self._seen_together = 2 * chains
 
-    def propose(
+    def _valued(
         self,
         state: PredictedState,
+        uniform: Tensor,
+        describe: Describe,
         generator: torch.Generator,
-        *,
-        batch: int,
-        describe: Describe = nothing_known,
-    ) -> Proposals:
-        """A batch of states, drawn by disagreement alone as long as fewer than 2 n were seen."""
-        shape = self._candidates, state.position.shape[1]
-        candidates = torch.empty(shape).uniform_(generator=generator)
-        first = candidates[::PATCHES_OF_ONE_VECTOR, :-2]
-        candidates[:, :-2] = first.repeat_interleave(PATCHES_OF_ONE_VECTOR, dim=0)
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        """One of each group; by disagreement alone as long as fewer than 2 n were seen."""
+        vectors = uniform[::PATCHES_OF_ONE_VECTOR, :-2]
+        repeated = vectors.repeat_interleave(PATCHES_OF_ONE_VECTOR, dim=0)
+        candidates = torch.cat([repeated, uniform[:, -2:]], dim=1)
         known = describe(candidates)
         values = worth(known, state.forest)
         best = self._one_of_each(values.view(-1, PATCHES_OF_ONE_VECTOR), generator)
-        return self._chosen(candidates[best], known[best], values[best], generator)
+        return candidates[best], known[best], values[best]
 
     def _one_of_each(self, values: Tensor, generator: torch.Generator) -> Tensor:
         """[g] candidates, one of each group, drawn by their values [g, k]."""

@@ -183,7 +183,7 @@ def test_after_each_step_the_average_follows_and_is_what_predicts() -> None:
 
 
 def test_answers_are_those_of_present_and_of_averaged_weights() -> None:
-    """Before the first step nowhere."""
+    """Which are the same before the first step."""
     made = module(Loss(), averaging=partial(exponential_average, decay=0.98))
     made._trainer = SimpleNamespace(  # type: ignore[assignment]
         precision_plugin=SimpleNamespace(forward_context=nullcontext)
