@@ -92,6 +92,7 @@ def build_module(
         averaging=instantiate(config.averaging),
     )
     if stream.sampler.needs_description:
+        module.averaged_network()  # said now, not at the first batch
         stream.description = learn.Description(samples=samples, answers=module.answers)
     return module
 

@@ -138,15 +138,20 @@ class IlluminationModule(LightningModule):
         inputs: the network's, of [n] images, on any device. Raises ValueError where no weights are
         averaged.
         """
+        averaged_network = self.averaged_network()
+        on_device = [tensor.to(self.device) for tensor in inputs]
+        with torch.no_grad(), self.trainer.precision_plugin.forward_context():
+            present, averaged = self.network(*on_device), averaged_network(*on_device)
+        return present.float().cpu(), averaged.float().cpu()
+
+    def averaged_network(self) -> nn.Module:
+        """Whose answers are to be compared. Raises ValueError where no weights are averaged."""
         if self.averaged is None:
             raise ValueError(
                 "averaging: what present and averaged weights disagree on is asked for, and none "
                 "are averaged; give averaging=exponential"
             )
-        on_device = [tensor.to(self.device) for tensor in inputs]
-        with torch.no_grad(), self.trainer.precision_plugin.forward_context():
-            present, averaged = self.network(*on_device), self.averaged.module(*on_device)
-        return present.float().cpu(), averaged.float().cpu()
+        return self.averaged.module
 
     def signals(self, patches: Patches, target: Target) -> Signals:
         """What `target` requires of [n] patches under the present weights and moments.

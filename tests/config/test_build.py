@@ -56,3 +56,21 @@ def test_a_sampler_that_looks_at_patches_is_told_of_them(
     )
     build_module(config, samples=samples, stream=stream, folder=tmp_path)
     assert (stream.description is not None) == described
+
+
+def test_a_sampler_that_looks_is_refused_without_averaged_weights_before_a_run_begins(
+    tmp_path: Path,
+) -> None:
+    config = composed(
+        "renderer=analytic",
+        "sampler=predicted_from_buffers",
+        "averaging=none",
+        f"run.folder={tmp_path}",
+    )
+    renderer = instantiate(config.renderer)
+    samples = build_samples(config, renderer=renderer)
+    stream = build_stream(
+        config, renderer=renderer, samples=samples, clock=learn.PhaseClock(), patches=tmp_path
+    )
+    with pytest.raises(ValueError, match="give averaging=exponential"):
+        build_module(config, samples=samples, stream=stream, folder=tmp_path)
