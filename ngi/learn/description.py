@@ -14,6 +14,13 @@ from ngi.learn.glimpses import sparse
 from ngi.learn.samples import Samples
 from ngi.patches import Patches
 
+DARK = 0.1
+"""Radiance below which an error counts by its size, and above which by its share of the radiance.
+
+What is bright has the larger errors, but pictures are compared by relative ones: chosen by absolute
+errors, patches leave out dark images.
+"""
+
 Answers = Callable[..., tuple[Tensor, Tensor]]
 """See `IlluminationModule.answers`."""
 
@@ -35,10 +42,11 @@ class Description:
 
     def _features(self, states: Tensor, resolution: int) -> Tensor:
         buffers, vectors = self._samples.glimpses(states, resolution=resolution)
-        disagreement = distances(*self._answers(buffers, vectors))
+        present, averaged = self._answers(buffers, vectors)
+        disagreement = distances(present, averaged)
         mean = disagreement.mean()
         relative = disagreement / mean if mean > 0 else torch.ones_like(disagreement)
-        return features(buffers, vectors, relative).cpu()
+        return features(buffers, vectors, averaged, relative).cpu()
 
     def errors(self, patches: Patches) -> Tensor:
         """[n] `distances` of the averaged network's answers to traced radiance, in a glimpse."""
@@ -48,13 +56,21 @@ class Description:
 
 
 def distances(one: Tensor, other: Tensor) -> Tensor:
-    """[n] mean absolute differences of images [n, h, w, 3] of log1p radiance."""
-    return (one - other).abs().mean(dim=(1, 2, 3))
+    """[n] mean absolute differences of log(radiance + `DARK`).
+
+    one, other: images [n, h, w, 3] of log1p radiance, at least 0 or counted as 0
+    """
+    return (_logarithms(one) - _logarithms(other)).abs().mean(dim=(1, 2, 3))
 
 
-def features(buffers: Tensor, vectors: Tensor, disagreement: Tensor) -> Tensor:
-    """[n, 2 C + D + 1]: mean and deviation of buffers [n, h, w, C], v [n, D], disagreement [n]."""
-    pixels = buffers.float()
+def features(buffers: Tensor, vectors: Tensor, answers: Tensor, disagreement: Tensor) -> Tensor:
+    """[n, 2 C + 6 + D + 1], the last the disagreement.
+
+    That is mean and deviation of each buffer and of log(radiance + `DARK`), v, and disagreement.
+
+    buffers: [n, h, w, C]; vectors: [n, D]; answers: [n, h, w, 3] log1p radiance; disagreement: [n]
+    """
+    pixels = torch.cat([buffers.float(), _logarithms(answers).to(buffers.device)], dim=-1)
     return torch.cat(
         [
             pixels.mean((1, 2)),
@@ -64,3 +80,7 @@ def features(buffers: Tensor, vectors: Tensor, disagreement: Tensor) -> Tensor:
         ],
         dim=1,
     )
+
+
+def _logarithms(log_radiance: Tensor) -> Tensor:
+    return (log_radiance.float().clamp(min=0).expm1() + DARK).log()

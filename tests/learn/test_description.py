@@ -10,7 +10,8 @@ import torch
 from torch import Tensor
 
 from ngi.explore import Importance, PredictedFromBuffers
-from ngi.learn import Description, PatchSamples, Samples, TrainingStream, features
+from ngi.learn import Description, PatchSamples, Samples, TrainingStream, distances, features
+from ngi.learn.description import DARK
 from ngi.learn.glimpses import PIXELS_APART, glimpsed_buffers
 from ngi.patches import Patches
 from ngi.render import AnalyticRenderer
@@ -79,21 +80,39 @@ def test_samples_that_are_no_patches_say_so() -> None:
         Others().glimpses(states(2), resolution=SIDE)
 
 
-def test_features_are_mean_and_deviation_of_each_channel() -> None:
-    buffers = torch.rand(5, 4, 4, 3, generator=torch.Generator().manual_seed(2))
+def test_features_are_mean_and_deviation_of_each_channel_and_of_the_answer() -> None:
+    generator = torch.Generator().manual_seed(2)
+    buffers = torch.rand(5, 4, 4, 3, generator=generator)
+    radiance = torch.rand(5, 4, 4, 3, generator=generator)
     vectors, disagreement = torch.rand(5, 2), torch.rand(5)
-    flat = buffers.numpy().reshape(5, 16, 3)
+    images = np.concatenate([buffers.numpy(), np.log(radiance.numpy() + DARK)], axis=-1)
+    flat = images.reshape(5, 16, 6)
     expected = [flat.mean(1), flat.std(1, ddof=1), vectors.numpy(), disagreement[:, None].numpy()]
-    found = features(buffers.to(torch.bfloat16), vectors, disagreement)
+    found = features(buffers.to(torch.bfloat16), vectors, radiance.log1p(), disagreement)
     np.testing.assert_allclose(found.numpy(), np.concatenate(expected, axis=1), atol=0.01)
     assert found.dtype == torch.float32
 
 
-@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize(
+    ("radiance", "answer", "expected"),
+    [
+        (0.0, 0.001, 0.01),  # in units of 0.1, where it is dark
+        (100.0, 101.0, 0.01),  # and of the radiance, where it is bright
+        (0.0, -0.5, 0.0),  # there is no radiance below 0
+    ],
+)
+def test_errors_count_by_their_share_where_it_is_bright(
+    radiance: float, answer: float, expected: float
+) -> None:
+    one, other = (torch.full((2, 3, 3, 3), value).log1p() for value in (radiance, answer))
+    assert distances(one, other).tolist() == pytest.approx([expected] * 2, rel=0.01)
+
+
+@pytest.mark.parametrize("scale", [0.01, 1.0, 8.0])
 def test_disagreement_counts_relative_to_its_mean(scale: float) -> None:
     given = torch.tensor([1.0, 2.0, 6.0])
     found = description(scale * given).at(SIDE)(states(3))
-    torch.testing.assert_close(found[:, -1], given / 3)
+    torch.testing.assert_close(found[:, -1], given / 3, rtol=1e-3, atol=0)
 
 
 def test_weights_that_agree_everywhere_tell_nothing() -> None:
@@ -113,7 +132,11 @@ def test_errors_are_those_of_the_averaged_weights_at_few_pixels() -> None:
         return torch.full_like(sparse, 7.0), sparse + too_high[:, None, None, None]
 
     found = Description(samples=PatchSamples(renderer=renderer()), answers=answers).errors(patches)
-    torch.testing.assert_close(found, torch.tensor([0.5, 2.0, 0.0]))
+    lit = sparse.numpy().astype(np.float64)
+    answered = np.maximum(lit + too_high.numpy()[:, None, None, None], 0.0)
+    ratio = (np.expm1(answered) + DARK) / (np.expm1(lit) + DARK)
+    np.testing.assert_allclose(found, np.abs(np.log(ratio)).mean((1, 2, 3)), rtol=1e-4, atol=1e-6)
+    assert found[0] > 0.1
 
 
 def make_patches(looked_at: Tensor) -> Patches:
@@ -129,11 +152,12 @@ def make_patches(looked_at: Tensor) -> Patches:
 
 
 def description(disagreement: Tensor) -> Description:
-    """Of weights that disagree by so much on each of [n] images."""
+    """Of weights that disagree by so much on each of [n] images, which are dark by the averaged."""
 
     def answers(buffers: Tensor, _: Tensor) -> tuple[Tensor, Tensor]:
         averaged = torch.zeros(*buffers.shape[:3], 3)
-        return averaged - disagreement[:, None, None, None], averaged
+        radiance = DARK * disagreement.expm1()
+        return averaged + radiance.log1p()[:, None, None, None], averaged
 
     return Description(samples=PatchSamples(renderer=renderer()), answers=answers)
 
@@ -205,4 +229,4 @@ def test_what_was_known_outlasts_an_interruption(tmp_path: Path) -> None:
     for first, second in itertools.zip_longest(steps(whole, 25), steps(again, 25)):
         assert_same(vars(first.patches), vars(second.patches))
     assert torch.equal(whole.chains.seen, again.chains.seen)  # type: ignore[attr-defined]
-    assert whole.chains.seen.shape[1] == 2 * renderer().layout.channels + 3 + 1  # type: ignore[attr-defined]
+    assert whole.chains.seen.shape[1] == 2 * (renderer().layout.channels + 3) + 3 + 1  # type: ignore[attr-defined]

@@ -12,7 +12,7 @@ from ngi.config.configuration import composed
 from ngi.explore import Importance
 from ngi.files.code_versions import code_version
 from ngi.studies.ceiling import campaign, choices, runs
-from ngi.studies.ceiling.choices import Oracle, Predicted, true_errors
+from ngi.studies.ceiling.choices import Oracle, Predicted, errors_of
 from ngi.studies.ceiling.runs import Run, plan
 from ngi.studies.provenance import claim
 
@@ -42,11 +42,12 @@ def configuration(folder: Path, *overrides: str) -> DictConfig:
 def test_every_run_of_a_small_study_is_done_once_and_repeats(tmp_path: Path) -> None:
     first = pd.read_csv(campaign.run_all(configuration(tmp_path / "a")))
     assert list(first["choice"]) == [
-        *("uniform", "oracle", "oracle_cubed", "predicted", "oracle_weighted", "uniform")
+        *("uniform", "oracle", "oracle_cubed", "oracle_relative", "predicted"),
+        *("oracle_weighted", "uniform"),
     ]
-    assert list(first["patches"]) == [16, 16, 16, 16, 16, 64]
+    assert list(first["patches"]) == [*[16] * 6, 64]
     assert (first[["hard_error", "uniform_error", "hard_tail"]] > 0).all(axis=None)
-    assert first["hard_error"].nunique() == 5  # of errors so much alike cubes choose the same
+    assert first["hard_error"].nunique() == 6  # of errors so much alike cubes choose the same
     assert (first["hard_relmse"] > 0).all()  # there is no noise, and much to learn
     files = sorted((tmp_path / "a" / "runs").iterdir())
     before = [file.stat().st_mtime_ns for file in files]
@@ -241,10 +242,8 @@ def test_weights_go_with_their_patches(recorded) -> None:
 
 
 def test_true_errors_are_those_of_the_patches_named() -> None:
-    class Training:
-        def errors(self, patches, truth):
-            (answers,) = (p.scene_vector[:, 0] for p in [patches])
-            return (answers - truth).abs()
+    def errors(patches, truth):
+        return (patches.scene_vector[:, 0] - truth).abs()
 
     from ngi.patches import BufferLayout, Patches
     from ngi.reuse import CompactPatches
@@ -254,8 +253,22 @@ def test_true_errors_are_those_of_the_patches_named() -> None:
     blank.scene_vector[:, 0] = torch.arange(6.0)
     pool = CompactPatches.compress(blank, layout)
     truth = torch.tensor([0.0, 0, 0, 0, 1, 1])
-    found = true_errors(Training(), pool, truth, torch.tensor([5, 2]))
+    found = errors_of(torch.tensor([5, 2]), errors, pool=pool, truth=truth)
     assert found.tolist() == [4, 2]
+
+
+def test_an_oracle_of_relative_errors_does_not_prefer_what_is_bright(recorded) -> None:  # noqa: ARG001
+    class Shares(Recorder):
+        def relative_errors(self, patches, truth):
+            return self.errors(patches, truth) / patches.clamp(min=1)
+
+    training, pool, truth = Shares(), torch.arange(1000.0), torch.zeros(1000)
+    given = Importance(uniform_share=0.0), {"training": training, "pool": pool, "truth": truth}
+    candidates = torch.tensor([1, 10, 900])
+    generator = torch.Generator()
+    assert Oracle(given[0], **given[1]).values(candidates, generator).tolist() == [1, 10, 900]
+    relative = Oracle(given[0], relative=True, **given[1])
+    assert relative.values(candidates, generator).tolist() == [1, 1, 1]
 
 
 class Disagreeing(Recorder):
@@ -287,6 +300,7 @@ def test_predictions_find_what_was_lost_where_something_tells_of_it(tells: bool)
         smallest_leaf=1,
         training=training,
         pool=pool,
+        truth=torch.zeros(1000),
     )
     runs.do(
         Run(patches=120, steps=4, choice="any", seed=0),

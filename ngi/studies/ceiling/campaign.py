@@ -77,7 +77,7 @@ def _choice(option: DictConfig, training: Training, pool: CompactPatches, truth:
     made: Importance | Callable[..., Choice] = instantiate(option)
     if isinstance(made, Importance):
         return Oracle(made, training=training, pool=pool, truth=truth)
-    return made(training=training, pool=pool)
+    return made(training=training, pool=pool, truth=truth)
 
 
 def _rendered(config: DictConfig, folder: Path) -> tuple[Samples, Evaluator, CompactPatches]:

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol
 
 import torch
@@ -12,6 +13,7 @@ from torch import Tensor
 from ngi.explore import Importance
 from ngi.explore.forest import grow
 from ngi.explore.predicted import worth
+from ngi.patches import Patches
 from ngi.reuse import CompactPatches
 from ngi.studies.ceiling.pool import chosen
 from ngi.studies.ceiling.training import Training
@@ -37,25 +39,35 @@ class Choice(Protocol):
 class Oracle(Choice):
     """By true errors, under the present averaged weights.
 
+    relative: as `Training.relative_errors` has them, in place of `Training.errors`
     truth: [m, h, w, 3] log1p radiance of the pool, see `Training.answers`
     """
 
     def __init__(
-        self, importance: Importance, *, training: Training, pool: CompactPatches, truth: Tensor
+        self,
+        importance: Importance,
+        *,
+        relative: bool = False,
+        training: Training,
+        pool: CompactPatches,
+        truth: Tensor,
     ) -> None:
         self.importance = importance
-        self._training, self._pool, self._truth = training, pool, truth
+        self._errors = training.relative_errors if relative else training.errors
+        self._pool, self._truth = pool, truth
 
     def values(self, candidates: Tensor, generator: torch.Generator) -> Tensor:
-        return true_errors(self._training, self._pool, self._truth, candidates)
+        return errors_of(candidates, self._errors, pool=self._pool, truth=self._truth)
 
 
 class Predicted(Choice):
     """As `PredictedFromBuffers` draws: by what is known of a patch before a path is traced.
 
-    That is v, mean and deviation of its buffers, and how far present and averaged weights disagree
-    on it. The forest is grown through the losses of all chosen before as they were new.
+    That is v, mean and deviation of its buffers and of the network's answer, and how far present
+    and averaged weights disagree on it. The forest is grown through the losses of all chosen
+    before, and what was known of them, as they were new.
 
+    truth: not looked at
     trees, depth, smallest_leaf: see `ngi.explore.forest.grow`
     """
 
@@ -68,6 +80,7 @@ class Predicted(Choice):
         smallest_leaf: int,
         training: Training,
         pool: CompactPatches,
+        truth: Tensor,
     ) -> None:
         self.importance = importance
         self._forest = {"trees": trees, "depth": depth, "smallest_leaf": smallest_leaf}
@@ -76,27 +89,32 @@ class Predicted(Choice):
         self._losses: list[Tensor] = []
 
     def values(self, candidates: Tensor, generator: torch.Generator) -> Tensor:
-        seen = _known(self._training, self._pool, torch.cat(self._seen))
-        forest = grow(seen, torch.cat(self._losses), generator, **self._forest)
-        return worth(_known(self._training, self._pool, candidates), forest)
+        forest = grow(torch.cat(self._seen), torch.cat(self._losses), generator, **self._forest)
+        return worth(self._described()[candidates], forest)
 
     def chose(self, numbers: Tensor) -> None:
         """Losses count relative to those of their round: later ones are lower."""
         parts = numbers.split(CHUNK)
         losses = torch.cat([self._training.losses(chosen(self._pool, part)) for part in parts])
-        self._seen.append(numbers)
+        self._seen.append(self._described()[numbers])
         self._losses.append(losses / losses.mean())
 
+    def _described(self) -> Tensor:
+        """[m, F]: the disagreement in units of its mean, as in runs that look."""
+        parts = torch.arange(len(self._pool)).split(CHUNK)
+        known = torch.cat([self._training.described(chosen(self._pool, part)) for part in parts])
+        mean = known[:, -1].mean()
+        known[:, -1] = known[:, -1] / mean if mean > 0 else 1.0
+        return known
 
-def _known(training: Training, pool: CompactPatches, numbers: Tensor) -> Tensor:
-    """[n, F] of patches by their numbers."""
-    parts = numbers.split(CHUNK)
-    return torch.cat([training.described(chosen(pool, part)) for part in parts])
 
-
-def true_errors(
-    training: Training, pool: CompactPatches, truth: Tensor, candidates: Tensor
+def errors_of(
+    numbers: Tensor,
+    measure: Callable[[Patches, Tensor], Tensor],
+    *,
+    pool: CompactPatches,
+    truth: Tensor,
 ) -> Tensor:
-    """[n] of the patches with these numbers, under the averaged weights."""
-    parts = candidates.split(CHUNK)
-    return torch.cat([training.errors(chosen(pool, part), truth[part]) for part in parts])
+    """[n] what `measure` makes of the patches with these numbers and their truth."""
+    parts = numbers.split(CHUNK)
+    return torch.cat([measure(chosen(pool, part), truth[part]) for part in parts])

@@ -12,7 +12,7 @@ from torch import Tensor
 from ngi.evaluate import METRICS, SETS, Evaluation, Evaluator
 from ngi.learn.new_losses import worst_share
 from ngi.reuse import CompactPatches
-from ngi.studies.ceiling.choices import Choice, true_errors
+from ngi.studies.ceiling.choices import Choice, errors_of
 from ngi.studies.ceiling.pool import chosen
 from ngi.studies.ceiling.training import Training
 
@@ -91,7 +91,7 @@ def do(
         left[candidates[drawn]] = False
         training.train(_part(run.steps, number, rounds))
     rest = left.nonzero().flatten() if left.any() else torch.arange(len(pool))
-    share = worst_share(true_errors(training, pool, truth, rest))
+    share = worst_share(errors_of(rest, training.errors, pool=pool, truth=truth))
     return {**run._asdict(), **measured(evaluator.evaluate(training.predict)), "worst_share": share}
 
 

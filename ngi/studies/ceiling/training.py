@@ -75,17 +75,22 @@ class Training:
 
         truth: [n, h, w, 3], at the pixels of `answers`
         """
+        return (self.answers(patches) - truth).abs().mean(dim=(1, 2, 3))
+
+    def relative_errors(self, patches: Patches, truth: Tensor) -> Tensor:
+        """[n] as a run that looks counts them, see `learn.distances`; truth: as in `errors`."""
         return learn.distances(self.answers(patches), truth)
 
     def losses(self, patches: Patches) -> Tensor:
-        """[n] `errors` against the traced radiance, noise included."""
-        return self.errors(patches, sparse(patches.log_radiance.float()))
+        """[n] `relative_errors` against the traced radiance, noise included."""
+        return self.relative_errors(patches, sparse(patches.log_radiance.float()))
 
     def described(self, patches: Patches) -> Tensor:
         """[n, F]: `learn.features` of what a glimpse of each shows."""
         buffers, vectors = self._glimpses(patches)
-        disagreement = learn.distances(*self._module.answers(buffers, vectors))
-        return learn.features(buffers, vectors, disagreement).cpu()
+        present, averaged = self._module.answers(buffers, vectors)
+        disagreement = learn.distances(present, averaged)
+        return learn.features(buffers, vectors, averaged, disagreement).cpu()
 
     def answers(self, patches: Patches) -> Tensor:
         """[n, h, w, 3] log1p radiance by the averaged weights, at the pixels of a glimpse."""
