@@ -295,6 +295,7 @@ def test_predictions_find_what_was_lost_where_something_tells_of_it(tells: bool)
     pool = torch.arange(1000.0)
     choice = Predicted(
         importance=Importance(uniform_share=0.0),
+        candidates=1000,
         trees=16,
         depth=4,
         smallest_leaf=1,
@@ -315,6 +316,26 @@ def test_predictions_find_what_was_lost_where_something_tells_of_it(tells: bool)
     share = (later > 900).float().mean().item()
     assert len(set(later.tolist())) == 90
     assert (share > 0.25) if tells else (share < 0.15)
+
+
+@pytest.mark.usefixtures("recorded")
+def test_what_is_not_looked_at_is_not_chosen() -> None:
+    training, pool = Disagreeing(tells=True), torch.arange(1000.0)
+    choice = Predicted(
+        importance=Importance(uniform_share=0.0),
+        candidates=40,
+        trees=4,
+        depth=2,
+        smallest_leaf=1,
+        training=training,
+        pool=pool,
+        truth=torch.zeros(1000),
+    )
+    choice.chose(torch.arange(0, 1000, 50))
+    values = choice.values(torch.arange(500), torch.Generator().manual_seed(0))
+    assert (values > 0).sum() == 40
+    again = choice.values(torch.arange(500), torch.Generator().manual_seed(1))
+    assert ((values > 0) & (again > 0)).sum() < 15
 
 
 def test_without_averaged_weights_there_is_nothing_to_disagree_with(tmp_path: Path) -> None:

@@ -67,6 +67,7 @@ class Predicted(Choice):
     and averaged weights disagree on it. The forest is grown through the losses of all chosen
     before, and what was known of them, as they were new.
 
+    candidates: of the patches that are left, so many are looked at in a round
     truth: not looked at
     trees, depth, smallest_leaf: see `ngi.explore.forest.grow`
     """
@@ -75,6 +76,7 @@ class Predicted(Choice):
         self,
         *,
         importance: Importance,
+        candidates: int,
         trees: int,
         depth: int,
         smallest_leaf: int,
@@ -85,12 +87,16 @@ class Predicted(Choice):
         self.importance = importance
         self._forest = {"trees": trees, "depth": depth, "smallest_leaf": smallest_leaf}
         self._training, self._pool = training, pool
+        self._candidates = candidates
         self._seen: list[Tensor] = []
         self._losses: list[Tensor] = []
 
     def values(self, candidates: Tensor, generator: torch.Generator) -> Tensor:
         forest = grow(torch.cat(self._seen), torch.cat(self._losses), generator, **self._forest)
-        return worth(self._described()[candidates], forest)
+        looked_at = torch.randperm(len(candidates), generator=generator)[: self._candidates]
+        values = torch.zeros(len(candidates))
+        values[looked_at] = worth(self._described()[candidates[looked_at]], forest)
+        return values
 
     def chose(self, numbers: Tensor) -> None:
         """Losses count relative to those of their round: later ones are lower."""
