@@ -15,9 +15,8 @@ LOOKING = "ours_predicted_from_buffers"
 
 def of_the_study() -> pd.DataFrame:
     """256 of 1,024 patches, by scene, choice and seed."""
-    tables = [pd.read_csv(FOLDER / name) for name in ("scarce_seeds.csv", "scarce_cubed.csv")]
-    runs = pd.concat(tables).query("patches == 256")
-    runs = runs.drop_duplicates(["scene", "choice", "seed"], keep="last")
+    before = pd.read_csv(FOLDER / "scarce_seeds.csv").query("choice in ('uniform', 'oracle')")
+    runs = pd.concat([before, pd.read_csv(FOLDER / "scarce_cubed.csv")]).query("patches == 256")
     return runs.set_index(["scene", "choice", "seed"]).sort_index()
 
 
@@ -26,37 +25,41 @@ def of_choice(runs: pd.DataFrame, scene: str, choice: str, error: str) -> pd.Ser
     return found
 
 
-def change(runs: pd.DataFrame, scene: str, choice: str, error: str, pairs: pd.Index) -> str:
-    """As a cell has it, over these seeds."""
-    base, own = (of_choice(runs, scene, name, error)[pairs] for name in ("uniform", choice))
-    return as_shown(difference_of(base, own)).split(" %")[0]
+def change(runs: pd.DataFrame, scene: str, choice: str, error: str) -> str:
+    """As a cell has it, over all seeds of the choice; nothing where there is none."""
+    if (scene, choice) not in runs.index.droplevel("seed"):
+        return ""
+    own = of_choice(runs, scene, choice, error)
+    base = of_choice(runs, scene, "uniform", error)[own.index]
+    return as_shown(difference_of(base, own)).replace(" %", "")
 
 
-CHOICES = ("oracle", "oracle_cubed", "predicted")
+ORACLES = ("oracle_cubed", "oracle_relative")
+TABLES = (
+    (("hard_error", ("oracle", *ORACLES, "predicted_absolute", "predicted")),),
+    tuple((error, (*ORACLES, "predicted")) for error in ("hard_tail", "uniform_error")),
+    tuple((error, (*ORACLES, "predicted")) for error in ("hard_mape", "hard_mae")),
+)
+"""Of the section on choices, one after the other: errors, and the choices that have columns."""
 
 
-def row_of(runs: pd.DataFrame, scene: str) -> list[str]:
-    """Over the seeds of the sampler's choice; nothing where the cubed oracle has no runs."""
-    pairs = of_choice(runs, scene, "predicted", "hard_error").index
-    there = runs.loc[scene].index.unique("choice")
-    cells = [
-        change(runs, scene, choice, error, pairs) if choice in there else ""
-        for error in ("hard_error", "hard_tail")
-        for choice in CHOICES
+def tables_of(runs: pd.DataFrame) -> list[list[list[str]]]:
+    """Of each table the rows, without the scene."""
+    return [
+        [
+            [change(runs, scene, choice, error) for error, choices in table for choice in choices]
+            for scene in sorted(runs.xs("predicted", level="choice").index.unique("scene"))
+        ]
+        for table in TABLES
     ]
-    return [f"{len(pairs)}", *cells, change(runs, scene, "predicted", "uniform_error", pairs)]
 
 
 def test_what_choices_take_off_is_what_the_studys_runs_say() -> None:
-    runs = of_the_study()
-    scenes = sorted(runs.xs("predicted", level="choice").index.unique("scene"))
     shown = rows_of(PAGE, "What a choice of patches takes off")
-    assert shown[2 : 2 + len(scenes)] == [row_of(runs, scene) for scene in scenes]
-    metrics = shown[4 + len(scenes) :]
-    for row, scene in zip(metrics, scenes, strict=True):
-        found = (f"hard_{metric}" for metric in ("mape", "dssim", "mae", "lpips"))
-        pairs = of_choice(runs, scene, "predicted", "hard_error").index
-        assert row == [change(runs, scene, "predicted", error, pairs) for error in found]
+    for rows in tables_of(of_the_study()):
+        assert shown[2 : 2 + len(rows)] == rows
+        shown = shown[2 + len(rows) :]
+    assert not shown
 
 
 def test_what_was_tried_is_what_its_runs_say() -> None:
