@@ -83,4 +83,6 @@ def features(buffers: Tensor, vectors: Tensor, answers: Tensor, disagreement: Te
 
 
 def _logarithms(log_radiance: Tensor) -> Tensor:
-    return (log_radiance.float().clamp(min=0).expm1() + DARK).log()
+    """log(radiance + `DARK`), finite for every finite log1p radiance."""
+    positive = log_radiance.float().clamp(min=0)
+    return positive + (-(1 - DARK) * (-positive).exp()).log1p()

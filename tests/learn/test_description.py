@@ -108,6 +108,12 @@ def test_errors_count_by_their_share_where_it_is_bright(
     assert distances(one, other).tolist() == pytest.approx([expected] * 2, rel=0.01)
 
 
+def test_answers_of_a_network_gone_astray_are_compared_too() -> None:
+    """A radiance that no float32 holds: differences are those of its logarithm."""
+    one, other = (torch.full((1, 3, 3, 3), value) for value in (200.0, 150.0))
+    assert distances(one, other).tolist() == [50.0]
+
+
 @pytest.mark.parametrize("scale", [0.01, 1.0, 8.0])
 def test_disagreement_counts_relative_to_its_mean(scale: float) -> None:
     given = torch.tensor([1.0, 2.0, 6.0])
