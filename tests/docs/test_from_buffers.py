@@ -35,10 +35,11 @@ def change(runs: pd.DataFrame, scene: str, choice: str, error: str) -> str:
 
 
 ORACLES = ("oracle_cubed", "oracle_relative")
+PREDICTED = ("predicted_absolute", "predicted")
 TABLES = (
-    (("hard_error", ("oracle", *ORACLES, "predicted_absolute", "predicted")),),
+    (("hard_error", ("oracle", *ORACLES, *PREDICTED)),),
     tuple((error, (*ORACLES, "predicted")) for error in ("hard_tail", "uniform_error")),
-    tuple((error, (*ORACLES, "predicted")) for error in ("hard_mape", "hard_mae")),
+    tuple((f"hard_{metric}", (*ORACLES, *PREDICTED)) for metric in ("mape", "mae")),
 )
 """Of the section on choices, one after the other: errors, and the choices that have columns."""
 
@@ -75,53 +76,89 @@ def test_what_was_tried_is_what_its_runs_say() -> None:
             assert [", ".join(changes), chosen] in rows, choice
 
 
-def of_runs(budget: str, scene: str) -> pd.DataFrame:
-    """The last evaluation of each."""
-    runs = pd.read_csv(FOLDER / "from_buffers.csv").query(
-        f"budget == '{budget}' and scene == '{scene}'"
-    )
-    return runs.set_index(["method", "seed"]).sort_index().groupby(level=[0, 1]).last()
+def of_runs(budget: str) -> pd.DataFrame:
+    """The last evaluation of each, by method, scene and seed."""
+    runs = pd.read_csv(FOLDER / "from_buffers.csv").query(f"budget == '{budget}'")
+    return runs.set_index(["method", "scene", "seed"]).sort_index().groupby(level=[0, 1, 2]).last()
+
+
+def errors_of(runs: pd.DataFrame) -> list[pd.Series]:
+    """What the table of the runs has columns for."""
+    by_frames = [(geometric_mean(runs, name), runs[f"{name}_tail"]) for name in FRAMES]
+    return [error for errors in by_frames for error in errors]
+
+
+FRAMES = ("hard", "uniform")
+KINDS = {"absolute_errors": "absolute", LOOKING: "relative"}
+"""Of runs that looked, as the table calls them."""
+
+
+def rows_of_runs(runs: pd.DataFrame) -> list[list[str]]:
+    """One for each pair, then one for each kind."""
+    rows = []
+    for method, kind in KINDS.items():
+        own = runs.loc[method]
+        base = runs.loc["ours_uniform"].loc[own.index]
+        pairs = list(zip(errors_of(base), errors_of(own), strict=True))
+        for pair in own.index:
+            counts = f"{base.patches_traced[pair]}, {own.patches_traced[pair]}"
+            changes = [tenths(b[pair] / a[pair] - 1) for a, b in pairs]
+            rows.append([kind, f"{pair[1]}", counts, f"{pairs[0][0][pair]:.4f}", *changes])
+        means = [as_shown(difference_of(a, b)).replace(" %", "") for a, b in pairs]
+        rows.append([kind, "all", "", "", *means])
+    return rows
 
 
 def test_what_runs_end_with_is_what_their_table_says() -> None:
-    runs = of_runs("scarce", "bathroom")
-    looking, uniform = runs.loc[LOOKING], runs.loc["ours_uniform"]
-    *rows, means = rows_of(PAGE, "In runs")[2:]
-    assert len(rows) == len(looking) == len(uniform)
-    errors = [
-        (geometric_mean(run, "hard"), run["hard_tail"], geometric_mean(run, "uniform"))
-        for run in (uniform, looking)
-    ]
-    for seed, row in zip(looking.index, rows, strict=True):
-        counts = f"{uniform.patches_traced[seed]}, {looking.patches_traced[seed]}"
-        changes = [tenths(b[seed] / a[seed] - 1) for a, b in zip(*errors, strict=True)]
-        assert row == [counts, f"{errors[0][0][seed]:.4f}", *changes]
-    assert means[2:] == [
-        as_shown(difference_of(a, b)).split(" %")[0] for a, b in zip(*errors, strict=True)
-    ]
+    assert rows_of(PAGE, "In runs")[2:] == rows_of_runs(of_runs("scarce"))
 
 
 def test_the_readme_says_what_the_page_says() -> None:
-    runs, looked = of_the_study(), of_runs("scarce", "bathroom")
-    hard = geometric_mean(looked, "hard")
-    expected = [
-        change(runs, scene, "predicted", error, of_choice(runs, scene, "predicted", error).index)
-        for scene in ("bathroom", "living-room")
-        for error in ("hard_error", "hard_tail")
-    ]
-    expected.append(
-        as_shown(difference_of(hard.loc["ours_uniform"], hard.loc[LOOKING])).split(" %")[0]
+    runs = of_the_study()
+    scenes = sorted(runs.xs("predicted", level="choice").index.unique("scene"))
+
+    def mean(choice: str, error: str) -> float:
+        changes = [
+            of_choice(runs, scene, choice, error) / of_choice(runs, scene, "uniform", error) - 1
+            for scene in scenes
+        ]
+        return float(np.mean([change.mean() for change in changes]))
+
+    number = r"(\d+\.\d) %"
+    pattern = rf"knows every error takes {number} .+? {number} .+? tell takes {number} .+? {number}"
+    for page in ("README.md", PAGE):
+        expected = [
+            mean(choice, error)
+            for choice in ("oracle_relative", "predicted")
+            for error in ("uniform_error", "uniform_tail")
+        ]
+        shown = [float(value) for value in said(page, pattern)]
+        assert shown == pytest.approx([round(-100 * value, 1) for value in expected]), page
+    shown_scenes = said(
+        "README.md",
+        r"bathroom \((−.+?)\) and living-room \((−.+?)\) gain, .+?caustic it is (\+.+?);",
     )
-    number = r"(\d+\.\d) % ± (\d+\.\d)"
-    pattern = rf"of bathroom have {number} less .+? and {number} less on their worst"
-    pattern += rf".+?of living-room {number} and {number} less; .+? end with {number} less"
-    shown = said("README.md", pattern)
-    pairs = zip(shown[::2], shown[1::2], strict=True)
-    assert [f"−{mean} ± {interval}" for mean, interval in pairs] == expected
+    expected_scenes = [
+        change(runs, scene, "predicted", "hard_error").split(" (")[0].replace(" ±", " % ±")
+        for scene in ("bathroom", "living-room", "sphere-caustic")
+    ]
+    assert list(shown_scenes) == expected_scenes
+
+
+def test_what_the_dark_of_spaceship_pays_is_what_its_runs_say() -> None:
+    runs = of_runs("scarce")
+    looking, uniform = (runs.loc[method].loc["spaceship"] for method in (LOOKING, "ours_uniform"))
+    for metric, pattern in (
+        ("mape", r"MAPE of hard frames is (.\d+) % in one and (.\d+) % in the other"),
+        ("lpips", r"their LPIPS (.\d+) and (.\d+) %"),
+    ):
+        changes = 100 * (looking[f"hard_{metric}"] / uniform[f"hard_{metric}"] - 1)
+        shown = [f"{change:+.0f}".replace("-", "−") for change in changes]
+        assert list(said(PAGE, pattern)) == shown
 
 
 def test_looking_takes_the_share_of_the_time_that_is_said() -> None:
-    looking = of_runs("scarce", "bathroom").loc[LOOKING]
+    looking = of_runs("scarce").loc[LOOKING]
     shares = 100 * looking["explore_seconds"] / looking["run_seconds"]
     shown = said(PAGE, r"takes (\d\.\d) to (\d\.\d) % of the run time")
     assert [float(share) for share in shown] == pytest.approx(
