@@ -287,15 +287,10 @@ class Disagreeing(Recorder):
         return (patches > 900).float() + 0.01
 
 
-@pytest.mark.parametrize("tells", [True, False])
-@pytest.mark.usefixtures("recorded")
-def test_predictions_find_what_was_lost_where_something_tells_of_it(tells: bool) -> None:
-    """A tenth of all numbers is lost on; of those that are drawn after the first round, a third."""
-    training = Disagreeing(tells=tells)
-    pool = torch.arange(1000.0)
-    choice = Predicted(
+def predicted(training: Disagreeing, pool: torch.Tensor, *, candidates: int) -> Predicted:
+    return Predicted(
         importance=Importance(uniform_share=0.0),
-        candidates=1000,
+        candidates=candidates,
         trees=16,
         depth=4,
         smallest_leaf=1,
@@ -303,6 +298,15 @@ def test_predictions_find_what_was_lost_where_something_tells_of_it(tells: bool)
         pool=pool,
         truth=torch.zeros(1000),
     )
+
+
+@pytest.mark.parametrize("tells", [True, False])
+@pytest.mark.usefixtures("recorded")
+def test_predictions_find_what_was_lost_where_something_tells_of_it(tells: bool) -> None:
+    """A tenth of all numbers is lost on; of those that are drawn after the first round, a third."""
+    training = Disagreeing(tells=tells)
+    pool = torch.arange(1000.0)
+    choice = predicted(training, pool, candidates=1000)
     runs.do(
         Run(patches=120, steps=4, choice="any", seed=0),
         training,
@@ -321,16 +325,7 @@ def test_predictions_find_what_was_lost_where_something_tells_of_it(tells: bool)
 @pytest.mark.usefixtures("recorded")
 def test_what_is_not_looked_at_is_not_chosen() -> None:
     training, pool = Disagreeing(tells=True), torch.arange(1000.0)
-    choice = Predicted(
-        importance=Importance(uniform_share=0.0),
-        candidates=40,
-        trees=4,
-        depth=2,
-        smallest_leaf=1,
-        training=training,
-        pool=pool,
-        truth=torch.zeros(1000),
-    )
+    choice = predicted(training, pool, candidates=40)
     choice.chose(torch.arange(0, 1000, 50))
     values = choice.values(torch.arange(500), torch.Generator().manual_seed(0))
     assert (values > 0).sum() == 40
