@@ -15,7 +15,7 @@ from ngi.learn.checkpoint import (
     read_checkpoint,
 )
 from ngi.learn.datamodule import ExplorationDataModule
-from ngi.learn.description import Description, distances, features
+from ngi.learn.description import Description, disagreeing_relatively, distances, features
 from ngi.learn.interruption import Interrupted, Interruption
 from ngi.learn.learning_rate import BaseRates
 from ngi.learn.lightning_trackers import MLflow, TensorBoard
@@ -76,6 +76,7 @@ __all__ = [
     "callbacks",
     "checkpoint_bytes",
     "components",
+    "disagreeing_relatively",
     "distances",
     "features",
     "network_of",

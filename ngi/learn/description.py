@@ -42,11 +42,9 @@ class Description:
 
     def _features(self, states: Tensor, resolution: int) -> Tensor:
         buffers, vectors = self._samples.glimpses(states, resolution=resolution)
-        present, averaged = self._answers(buffers, vectors)
-        disagreement = distances(present, averaged)
-        mean = disagreement.mean()
-        relative = disagreement / mean if mean > 0 else torch.ones_like(disagreement)
-        return features(buffers, vectors, averaged, relative).cpu()
+        return disagreeing_relatively(
+            features(buffers, vectors, *self._answers(buffers, vectors)).cpu()
+        )
 
     def errors(self, patches: Patches) -> Tensor:
         """[n] `distances` of the averaged network's answers to traced radiance, in a glimpse."""
@@ -63,14 +61,16 @@ def distances(one: Tensor, other: Tensor) -> Tensor:
     return (_logarithms(one) - _logarithms(other)).abs().mean(dim=(1, 2, 3))
 
 
-def features(buffers: Tensor, vectors: Tensor, answers: Tensor, disagreement: Tensor) -> Tensor:
-    """[n, 2 C + 6 + D + 1], the last the disagreement.
+def features(buffers: Tensor, vectors: Tensor, present: Tensor, averaged: Tensor) -> Tensor:
+    """[n, 2 C + 6 + D + 1], the last the disagreement: how far the two answers are apart.
 
-    That is mean and deviation of each buffer and of log(radiance + `DARK`), v, and disagreement.
+    Before it, mean and deviation of each buffer and of log(radiance + `DARK`) by the averaged
+    weights, and v.
 
-    buffers: [n, h, w, C]; vectors: [n, D]; answers: [n, h, w, 3] log1p radiance; disagreement: [n]
+    buffers: [n, h, w, C]; vectors: [n, D]; present, averaged: answers [n, h, w, 3], log1p radiance
     """
-    pixels = torch.cat([buffers.float(), _logarithms(answers).to(buffers.device)], dim=-1)
+    pixels = torch.cat([buffers.float(), _logarithms(averaged).to(buffers.device)], dim=-1)
+    disagreement = distances(present, averaged)
     return torch.cat(
         [
             pixels.mean((1, 2)),
@@ -80,6 +80,14 @@ def features(buffers: Tensor, vectors: Tensor, answers: Tensor, disagreement: Te
         ],
         dim=1,
     )
+
+
+def disagreeing_relatively(known: Tensor) -> Tensor:
+    """`features` [n, F] whose disagreement is in units of its mean, 1 where all agree."""
+    disagreement = known[:, -1:]
+    mean = disagreement.mean()
+    relative = disagreement / mean if mean > 0 else torch.ones_like(disagreement)
+    return torch.cat([known[:, :-1], relative], dim=1)
 
 
 def _logarithms(log_radiance: Tensor) -> Tensor:

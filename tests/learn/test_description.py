@@ -84,11 +84,12 @@ def test_features_are_mean_and_deviation_of_each_channel_and_of_the_answer() -> 
     generator = torch.Generator().manual_seed(2)
     buffers = torch.rand(5, 4, 4, 3, generator=generator)
     radiance = torch.rand(5, 4, 4, 3, generator=generator)
-    vectors, disagreement = torch.rand(5, 2), torch.rand(5)
-    images = np.concatenate([buffers.numpy(), np.log(radiance.numpy() + DARK)], axis=-1)
-    flat = images.reshape(5, 16, 6)
-    expected = [flat.mean(1), flat.std(1, ddof=1), vectors.numpy(), disagreement[:, None].numpy()]
-    found = features(buffers.to(torch.bfloat16), vectors, radiance.log1p(), disagreement)
+    vectors, other = torch.rand(5, 2), torch.rand(5, 4, 4, 3, generator=generator)
+    answer, other_answer = (np.log(lit.numpy() + DARK) for lit in (radiance, other))
+    flat = np.concatenate([buffers.numpy(), answer], axis=-1).reshape(5, 16, 6)
+    disagreement = np.abs(other_answer - answer).mean((1, 2, 3))[:, None]
+    expected = [flat.mean(1), flat.std(1, ddof=1), vectors.numpy(), disagreement]
+    found = features(buffers.to(torch.bfloat16), vectors, other.log1p(), radiance.log1p())
     np.testing.assert_allclose(found.numpy(), np.concatenate(expected, axis=1), atol=0.01)
     assert found.dtype == torch.float32
 

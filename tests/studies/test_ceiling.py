@@ -263,12 +263,16 @@ def test_an_oracle_of_relative_errors_does_not_prefer_what_is_bright(recorded) -
             return self.errors(patches, truth) / patches.clamp(min=1)
 
     training, pool, truth = Shares(), torch.arange(1000.0), torch.zeros(1000)
-    given = Importance(uniform_share=0.0), {"training": training, "pool": pool, "truth": truth}
-    candidates = torch.tensor([1, 10, 900])
-    generator = torch.Generator()
-    assert Oracle(given[0], **given[1]).values(candidates, generator).tolist() == [1, 10, 900]
-    relative = Oracle(given[0], relative=True, **given[1])
-    assert relative.values(candidates, generator).tolist() == [1, 1, 1]
+    for relative, expected in ((False, [1, 10, 900]), (True, [1, 1, 1])):
+        oracle = Oracle(
+            Importance(uniform_share=0.0),
+            relative=relative,
+            training=training,
+            pool=pool,
+            truth=truth,
+        )
+        values = oracle.values(torch.tensor([1, 10, 900]), torch.Generator())
+        assert values.tolist() == expected
 
 
 class Disagreeing(Recorder):

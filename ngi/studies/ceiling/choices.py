@@ -13,6 +13,7 @@ from torch import Tensor
 from ngi.explore import Importance
 from ngi.explore.forest import grow
 from ngi.explore.predicted import worth
+from ngi.learn import disagreeing_relatively
 from ngi.patches import Patches
 from ngi.reuse import CompactPatches
 from ngi.studies.ceiling.pool import chosen
@@ -108,10 +109,9 @@ class Predicted(Choice):
     def _described(self) -> Tensor:
         """[m, F]: the disagreement in units of its mean, as in runs that look."""
         parts = torch.arange(len(self._pool)).split(CHUNK)
-        known = torch.cat([self._training.described(chosen(self._pool, part)) for part in parts])
-        mean = known[:, -1].mean()
-        known[:, -1] = known[:, -1] / mean if mean > 0 else 1.0
-        return known
+        return disagreeing_relatively(
+            torch.cat([self._training.described(chosen(self._pool, part)) for part in parts])
+        )
 
 
 def errors_of(

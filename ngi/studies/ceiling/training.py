@@ -88,9 +88,7 @@ class Training:
     def described(self, patches: Patches) -> Tensor:
         """[n, F]: `learn.features` of what a glimpse of each shows."""
         buffers, vectors = self._glimpses(patches)
-        present, averaged = self._module.answers(buffers, vectors)
-        disagreement = learn.distances(present, averaged)
-        return learn.features(buffers, vectors, averaged, disagreement).cpu()
+        return learn.features(buffers, vectors, *self._module.answers(buffers, vectors)).cpu()
 
     def answers(self, patches: Patches) -> Tensor:
         """[n, h, w, 3] log1p radiance by the averaged weights, at the pixels of a glimpse."""
