@@ -84,7 +84,7 @@ def features(buffers: Tensor, vectors: Tensor, present: Tensor, averaged: Tensor
 
 def disagreeing_relatively(known: Tensor) -> Tensor:
     """`features` [n, F] whose disagreement is in units of its mean, 1 where all agree."""
-    disagreement = known[:, -1:]
+    disagreement = known[:, -1:].contiguous()  # summed as if it stood alone
     mean = disagreement.mean()
     relative = disagreement / mean if mean > 0 else torch.ones_like(disagreement)
     return torch.cat([known[:, :-1], relative], dim=1)
