@@ -58,11 +58,7 @@ class TrainingStream:
     ) -> None:
         for iteration in (0, ENDLESS):
             samples.check_resolution(schedule.resolution(iteration))
-        if reuse.store.capacity < 2 * sampler.chains:
-            raise ValueError(
-                f"reuse.store.capacity: {reuse.store.capacity} patches do not hold the chains' "
-                f"current states and a new batch; expected at least {2 * sampler.chains}"
-            )
+        reuse.check_capacity(chains=sampler.chains)
         self.sampler = sampler
         self.store = reuse.store
         self.saved_stores = SavedStores(reuse.store, reuse.archive)
@@ -191,8 +187,13 @@ class TrainingStream:
                 store_size=len(self.store),
                 store_capacity=self.store.capacity,
             )
-            draw = torch.rand((), generator=self._generator, dtype=torch.float64)
-            if draw < self.reuse_probability or self._postpone(ahead):
+            reused = self._policy.reuses(
+                self.reuse_probability,
+                draw=torch.rand((), generator=self._generator, dtype=torch.float64).item(),
+                batches=self.counters.iteration,
+                generated_batches=self.counters.generated_batches,
+            )
+            if reused or self._postpone(ahead):
                 ids = self.store.draw(self.sampler.chains, self._generator)
                 return Batch(
                     self._samples.rearranged(self.store.get(ids), self._generator),

@@ -35,7 +35,7 @@ class PolicyState:
 
 
 class ReusePolicy(Protocol):
-    """Gives the probability with which the next batch is a reused one."""
+    """Decides whether the next batch is a reused one."""
 
     by_loss: bool = False  # whether it depends on the losses
 
@@ -52,6 +52,16 @@ class ReusePolicy(Protocol):
         store_size, store_capacity: in patches
         """
         ...
+
+    def reuses(
+        self, probability: float, *, draw: float, batches: int, generated_batches: int
+    ) -> bool:
+        """Whether the next batch is reused: by the paper with that probability.
+
+        draw: uniform in [0, 1)
+        batches, generated_batches: number of batches so far, and of those that were generated
+        """
+        return draw < probability
 
     def update(
         self, state: PolicyState, *, reused: bool, losses: Tensor, large_step: Tensor
@@ -93,7 +103,11 @@ would have it at 1,800, has more error than 50 times (docs/exploration-ceiling).
 
 
 class FixedProbability(ReusePolicy):
-    """Reuses with one probability, once `bootstrap_batches` batches were generated."""
+    """Reuses one share of batches, once `bootstrap_batches` batches were generated.
+
+    Generated batches come at even distances, not by chance: were they drawn, one run would have a
+    fifth more patches than another of as many steps, and that is not what samplers differ by.
+    """
 
     def __init__(self, *, bootstrap_batches: int, probability: float) -> None:
         _check_bootstrap(bootstrap_batches)
@@ -125,6 +139,14 @@ class FixedProbability(ReusePolicy):
         if store_size == 0 or generated_batches < self._bootstrap_batches:
             return 0.0
         return self._probability
+
+    def reuses(
+        self, probability: float, *, draw: float, batches: int, generated_batches: int
+    ) -> bool:
+        if probability == 0:
+            return False
+        due = (batches + 1 - self._bootstrap_batches) * (1 - probability)
+        return generated_batches - self._bootstrap_batches >= math.floor(due + 0.5)
 
 
 class SelfTuning(ReusePolicy):

@@ -30,3 +30,11 @@ class Reuse:
                 f"reuse.when_late: '{self.when_late}'; expected one of {list(WHEN_LATE)}: wait for "
                 "patches that are not rendered yet, or train on stored ones until they are"
             )
+
+    def check_capacity(self, *, chains: int) -> None:
+        """Raises ValueError where the store is smaller than two batches of so many patches."""
+        if self.store.capacity < 2 * chains:
+            raise ValueError(
+                f"reuse.store.capacity: {self.store.capacity} patches do not hold the chains' "
+                f"current states and a new batch; expected at least {2 * chains}"
+            )

@@ -1,10 +1,11 @@
 import io
+from itertools import pairwise
 
 import pytest
 import torch
 from scipy.special import expit
 
-from ngi.reuse import FixedProbability, Never, PolicyState, SelfTuning, UntilFull
+from ngi.reuse import FixedProbability, Never, PolicyState, ReusePolicy, SelfTuning, UntilFull
 
 PAPER = {"bootstrap_batches": 100, "beta": 4.6, "ema_coefficient": 0.9}
 LATER = {"generated_batches": 100, "store_size": 1600, "store_capacity": 100_000}
@@ -134,6 +135,42 @@ def test_a_patch_is_trained_on_as_often_as_its_noise_is_low(samples: int, times:
     )
     new = 1 - policy.probability(policy.init(), **LATER)
     assert new == pytest.approx(1 / times)
+
+
+@pytest.mark.parametrize("probability", [0.0, 0.5, 0.92, 0.98, 1.0])
+@pytest.mark.parametrize("bootstrap", [1, 3])
+def test_a_fixed_share_is_generated_at_even_distances(probability: float, bootstrap: int) -> None:
+    """By counting, whatever is drawn."""
+    policy = FixedProbability(bootstrap_batches=bootstrap, probability=probability)
+    when = []
+    for batch in range(1000):
+        p = policy.probability(
+            policy.init(), generated_batches=len(when), store_size=batch, store_capacity=10**5
+        )
+        draw = (batch * 0.618) % 1
+        if not policy.reuses(p, draw=draw, batches=batch, generated_batches=len(when)):
+            when.append(batch)
+        since = batch + 1 - bootstrap
+        assert since <= 0 or abs(len(when) - bootstrap - since * (1 - probability)) <= 0.51
+    assert when[:bootstrap] == list(range(bootstrap))
+    distances = {b - a for a, b in pairwise(when[bootstrap:])}
+    assert len(distances) <= 2
+    assert all(abs(distance * (1 - probability) - 1) < 1 - probability for distance in distances)
+
+
+def test_batches_that_were_postponed_are_made_up_for() -> None:
+    policy = FixedProbability(bootstrap_batches=3, probability=0.9)
+    late = {"draw": 0.5, "batches": 3 + 25}
+    assert [policy.reuses(0.9, generated_batches=n, **late) for n in (4, 5, 6)] == [0, 0, 1]
+
+
+@pytest.mark.parametrize("policy", [SelfTuning(**PAPER), UntilFull(), Never()])
+def test_the_papers_policy_and_the_fixed_data_set_draw(policy: ReusePolicy) -> None:
+    """As they always did: a number below the probability reuses."""
+    counts = {"batches": 50, "generated_batches": 7}
+    assert policy.reuses(0.7, draw=0.699, **counts)
+    assert not policy.reuses(0.7, draw=0.7, **counts)
+    assert not policy.reuses(0.0, draw=0.0, **counts)
 
 
 def test_at_32_samples_ours_reuses_as_often_as_when_its_figures_were_measured() -> None:
