@@ -26,8 +26,9 @@ def own_arguments(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "argv", ["pytest"])
 
 
-def test_help_shows_the_way(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["--help"]) == 0
+@pytest.mark.parametrize("word", ["--help", "-h", "help"])
+def test_help_shows_the_way(word: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([word]) == 0
     lines = capsys.readouterr().out.splitlines()
     shown = [line.split()[0] for line in lines if line[:2] == "  " and line.split()[0] in VERBS]
     assert shown == list(VERBS)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import hydra
 from hydra.core.config_store import ConfigStore
+from hydra.core.hydra_config import HydraConfig
 from omegaconf import DictConfig, OmegaConf
 
 import ngi
@@ -50,6 +51,12 @@ def run_group(experiment: str | None, budget: str, clock: str) -> str:
     return group if clock == "wall" else f"{group}-{clock}-clock"
 
 
+def choice(group: str, *, _root_: DictConfig) -> Any:
+    """Which option of a group is chosen, in a configuration with Hydra's own part or without."""
+    hydra_part = _root_.hydra if "hydra" in _root_ else HydraConfig.get()
+    return hydra_part.runtime.choices[group]
+
+
 if TYPE_CHECKING:
     from ngi.learn import Costs
 
@@ -71,6 +78,7 @@ RESOLVERS: dict[str, Callable[..., Any]] = {
     "run_name": run_name,
     "said_overrides": said_overrides,
     "run_group": run_group,
+    "choice": choice,
     "fast_precision": fast_precision,
     "network_width": network_width,
     "network_depth": network_depth,

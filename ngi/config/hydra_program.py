@@ -16,17 +16,22 @@ from collections.abc import Callable, Iterator, Sequence
 from difflib import get_close_matches
 from typing import Any, NoReturn
 
+from hydra._internal.utils import get_args_parser
 from hydra.core.hydra_config import HydraConfig
 from hydra.errors import (
     CompactHydraException,
+    ConfigCompositionException,
     InstantiationException,
     MissingConfigException,
+    OverrideParseException,
 )
 from hydra.types import RunMode
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from ngi.config.unread_output import readers_may_leave
+
+MULTIRUN = ("-m", "--multirun")
 
 OURS = ("budget=machine", "method=ours")
 """What is added to the words."""
@@ -49,6 +54,25 @@ def completed(words: Sequence[str]) -> list[str]:
     if named.get("budget", "machine") != "machine" or elsewhere:
         return list(words)
     return with_overrides(words, *(word for word in OURS if word.split("=")[0] not in named))
+
+
+def in_order(words: Sequence[str]) -> list[str]:
+    """The words with -m before all others; argparse refuses overrides on both sides of an option.
+
+    Raises SystemExit, with a message, for an option that Hydra does not have.
+    """
+    multirun = [word for word in words if word in MULTIRUN]
+    ordered = [*multirun[:1], *(word for word in words if word not in MULTIRUN)]
+    unknown = get_args_parser().parse_known_args(ordered)[1]
+    if unknown and unknown[0].startswith("-"):
+        name, _, value = unknown[0].lstrip("-").partition("=")
+        sys.exit(
+            f"{unknown[0]}: there is no such option; what a run is made of is given without "
+            f"dashes, as {name}={value or '…'} (--help lists it)"
+        )
+    if unknown:
+        sys.exit(f"{unknown[0]}: options have to come before all words like this one")
+    return ordered
 
 
 def with_overrides(words: Sequence[str], *overrides: str) -> list[str]:
@@ -86,6 +110,7 @@ def run_program(program: Callable[[], None], *, folder_option: str = "run.folder
         program()
         return
     os.environ[FULL_ERROR] = "1"
+    sys.argv[1:] = in_order(sys.argv[1:])
     try:
         with readers_may_leave():
             program()
@@ -136,14 +161,29 @@ def explained(error: Exception) -> str:
     if isinstance(error, MissingConfigException) and error.options is not None:
         group, _, option = str(error.missing_cfg_file).rpartition("/")
         near = get_close_matches(option, error.options, n=1)
+        group = "scene" if group.startswith("scene/") else group  # a path, not a name
+        where = "; scenes are folders in ./scenes and $NGI_SCENES" * (group == "scene")
         return (
             f"{error.missing_cfg_file}: there is no such option; "
-            f"{group} can be {', '.join(error.options)}{_question(near)}"
+            f"{group} can be {', '.join(error.options)}{where}{_question(near)}"
         )
     if isinstance(cause, AttributeError | KeyError) and isinstance(cause, OmegaConfBaseException):
         return _about_key(cause)
+    if isinstance(error, OverrideParseException):
+        return _about_word(error)
+    if isinstance(error, ConfigCompositionException) and str(error).startswith("Ambiguous"):
+        return str(error).replace("add --multirun to your command line", "give -m")
+    if missing := re.search(r"Missing mandatory value: (\S+)", str(error)):
+        return f"{missing[1]}: it has to be given, {missing[1]}=…"
     told = isinstance(cause, OmegaConfBaseException)
     return f"{error}\n{cause}" if told else str(error)
+
+
+def _about_word(error: OverrideParseException) -> str:
+    if "=" not in error.override:
+        return f"'{error.override}': give key=value, without blanks around the ="
+    problem = error.message.removeprefix(f"Error parsing override '{error.override}'").strip()
+    return f"'{error.override}': {problem}"
 
 
 def _about_key(error: OmegaConfBaseException) -> str:
@@ -156,12 +196,13 @@ def _about_key(error: OmegaConfBaseException) -> str:
     if near:
         return f"{full_key}: there is no such key{_question([above + near[0]])}{swept}"
     there = ", ".join(above + k for k in known if "." not in k) or "none"
-    adding = swept or f" (+{full_key}=… adds one)"
+    adds = isinstance(parent, DictConfig) and "_target_" in parent
+    adding = swept or f" (+{full_key}=… adds one)" * adds
     return f"{full_key}: there is no such key; there are {there}{adding}"
 
 
 def _sweeps() -> bool:
-    return not {"-m", "--multirun"}.isdisjoint(sys.argv)
+    return not set(MULTIRUN).isdisjoint(sys.argv)
 
 
 def _question(near: list[str]) -> str:

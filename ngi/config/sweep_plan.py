@@ -22,7 +22,7 @@ from tqdm import tqdm
 from ngi.clock.counters import Counters
 from ngi.config.build import run_components, without_seed
 from ngi.config.configuration import run_settings
-from ngi.config.hydra_program import MESSAGES
+from ngi.config.hydra_program import MESSAGES, in_plain_words
 from ngi.config.values import check_values
 from ngi.files.code_versions import code_version, code_versions, same_program
 from ngi.files.row_log import RowLog
@@ -103,9 +103,8 @@ def planned_run(config: DictConfig, costs: dict[str, float | None]) -> Planned:
         done = _done(folder, budget) if state in ("interrupted", "longer") else 0.0
         left = 0.0 if "path_tracing" in config else _left(config, budget, done, costs)
     except (*MESSAGES, HydraException, OmegaConfBaseException) as error:
-        wrapped = error.__cause__ if isinstance(error, HydraException) else None
-        cause = wrapped or error
-        return Planned(folder, f"cannot start: {str(cause).splitlines()[0]}", 0.0, None)
+        why = in_plain_words(error).splitlines()[0]
+        return Planned(folder, f"cannot start: {why}", 0.0, None)
     if state == "finished":
         done, left = 1.0, 0.0
     settings = {**run_settings(config, scene_hash="", costs=None), "budget": None}

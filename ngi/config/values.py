@@ -3,11 +3,14 @@
 import inspect
 import math
 from collections.abc import Callable, Iterator
+from difflib import get_close_matches
 from pkgutil import resolve_name
 from types import NoneType, UnionType
 from typing import Any, Union, Unpack, get_args, get_origin, get_type_hints
 
-from omegaconf import DictConfig
+from omegaconf import DictConfig, OmegaConf
+
+from ngi.files.resources import root
 
 LARGEST_INTEGER = 2**31 - 1
 """What fits everywhere: into tensors' sizes, Mitsuba's parameters, random seeds."""
@@ -26,12 +29,19 @@ _BESIDE: dict[str, Any] = {
 """Kinds of values that are no argument of a class."""
 
 
+_OF_STUDIES = ("ceiling",)
+"""Keys that an experiment adds for what is started by another command."""
+
+
 def check_values(config: DictConfig) -> None:
     """ValueError, naming key and value, for one that is not of the kind its class says.
+
+    A key that nothing reads is refused, too: misspelt, it would be without effect.
 
     Checked are numbers, true and false, and texts; integers have at most 31 bits, and no number is
     NaN or infinite. What a class accepts beyond that it says itself.
     """
+    _check_keys(config)
     for key, value, kind in (*_arguments(config, ""), *_others(config)):
         kinds = get_args(kind) if get_origin(kind) in (Union, UnionType) else (kind,)
         if isinstance(value, DictConfig) and "_target_" in value:
@@ -44,6 +54,23 @@ def check_values(config: DictConfig) -> None:
         text = repr(value)
         shown = text if len(text) < 60 else f"{text[:40]}…"
         raise ValueError(f"{key}: {shown} is not {' or '.join(wanted)} that can be used here")
+
+
+def _check_keys(config: DictConfig) -> None:
+    """Of the whole and of `run`; the parts with a class are checked where they are made."""
+    conf = root() / "conf"
+    plain = OmegaConf.load(conf / "train.yaml")
+    groups = {folder.name for folder in conf.iterdir() if folder.is_dir()}
+    for path, node, known in (
+        ("", config, {*map(str, plain), *groups, *_OF_STUDIES}),
+        ("run.", config.run, set(map(str, plain.run))),
+    ):
+        for key in node:
+            if key not in known:
+                near = get_close_matches(str(key), {*known, "sweeps"}, n=1, cutoff=0.8)
+                name = "+sweeps" if near == ["sweeps"] else "".join([path, *near])
+                meant = f"; did you mean '{name}'?" if near else "; leave it out"
+                raise ValueError(f"{path}{key!s}: nothing reads this key{meant}")
 
 
 def _arguments(node: DictConfig, path: str) -> Iterator[tuple[str, Any, Any]]:

@@ -12,7 +12,7 @@ from ngi.config.options import option, run_tool
 class GalleryOptions:
     """Makes a contact sheet of every scene: random configurations, hard frames and buffers.
 
-    ngi gallery mirror salon configurations=4
+    ngi gallery mirror salon-9 configurations=4
     """
 
     scenes: list[str] | None = option("names; none: all scenes", None)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from ngi.config.hydra_program import completed, with_overrides
+from ngi.config.hydra_program import completed, in_order, with_overrides
 from tests.learn.command_line import run
 
 
@@ -64,6 +64,33 @@ def test_what_is_named_is_taken_at_its_word(words: str) -> None:
 )
 def test_further_overrides_stand_with_the_users(words: str, expected: str) -> None:
     assert with_overrides(words.split(), "x=1") == expected.split()
+
+
+def test_an_option_may_stand_among_overrides() -> None:
+    words = ["scene=mirror", "-m", "seed=0,1"]
+    assert in_order(words) == ["-m", "scene=mirror", "seed=0,1"]
+    assert in_order(words[::2]) == words[::2]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["a=b", "--budget", "small"], "--budget: there is no such option; .* as budget=…"),
+        (["--seed=1"], "--seed=1: there is no such option; .* without dashes, as seed=1 "),
+        (["a=b", "--cfg", "job", "c=d"], "^c=d: options have to come before"),
+    ],
+)
+def test_what_is_no_option_is_answered_by_what_it_may_be(words: list[str], message: str) -> None:
+    with pytest.raises(SystemExit, match=message):
+        in_order(words)
+
+
+def test_all_settings_of_a_run_can_be_shown(tmp_path: Path) -> None:
+    """As the help says; the folder's name is by choices that Hydra takes away before it shows."""
+    options = ("--cfg", "job", "--resolve")
+    status, output = run(tmp_path, "scene=mirror", "+sweeps=dear", base=(), options=options)
+    assert status == 0, output
+    assert f"folder: {tmp_path}/outputs/dear/paper/mirror/default/seed=0\n" in output
 
 
 TINY = (

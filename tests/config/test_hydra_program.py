@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from hydra.errors import HydraException
+from omegaconf.errors import OmegaConfBaseException
 
 from ngi.config.configuration import composed
 from ngi.config.hydra_program import explained, run_program
@@ -37,13 +38,36 @@ from tests.learn.command_line import SMALL, run, run_module
             "adam_small, adam_tuned, muon; did you mean 'adam'?",
         ),
         ("+sweeps=xyz", "sweeps/xyz: there is no such option; sweeps can be acceptance, anf, "),
-        ("seed", "Error parsing override 'seed'"),
+        ("seed", "'seed': give key=value, without blanks around the ="),
+        ("seed=[1", "'seed=[1': no viable alternative at input '[1'"),
+        ("seed=0,1", "3. To sweep over it, give -m"),
+        ("supersampled_edges=1", "_edges: there is no such key; there are seed, viewer, "),
+        (
+            "scene=./scenes/miror",
+            "veach-egg; scenes are folders in ./scenes and $NGI_SCENES; did you mean 'mirror'?",
+        ),
     ],
 )
 def test_of_what_does_not_exist_the_nearest_is_named(word: str, message: str) -> None:
     with pytest.raises(HydraException) as raised:
         composed("renderer=analytic", word)
     assert message in explained(raised.value)
+
+
+def test_what_has_to_be_given_is_asked_for() -> None:
+    config = composed("scene=release")
+    with pytest.raises(OmegaConfBaseException) as raised:
+        config.scene.name  # noqa: B018 - reading it is what fails
+    assert explained(raised.value) == "scene.path: it has to be given, scene.path=…"
+
+
+def test_of_a_part_without_a_class_nobody_is_told_to_add_a_key() -> None:
+    with pytest.raises(HydraException) as raised:
+        composed("run.folders=3")
+    assert explained(raised.value).endswith("did you mean 'run.folder'?")
+    with pytest.raises(HydraException) as raised:
+        composed("run.zzz=3")
+    assert "adds one" not in explained(raised.value)
 
 
 def test_a_sweep_whose_settings_are_asked_for_is_told_how(tmp_path: Path) -> None:
@@ -110,6 +134,7 @@ def test_ctrl_c_ends_a_program_without_a_traceback(monkeypatch: pytest.MonkeyPat
         raise KeyboardInterrupt
 
     monkeypatch.setenv("HYDRA_FULL_ERROR", "0")
+    monkeypatch.setattr("sys.argv", ["ngi train"])
     with pytest.raises(SystemExit) as ended:
         run_program(interrupted)
     assert ended.value.code == 130

@@ -22,8 +22,10 @@ from omegaconf.errors import OmegaConfBaseException
 
 from ngi import learn
 from ngi.config.build import build_recorder, build_run, run_costs
+from ngi.config.configuration import composed
 from ngi.config.hydra_program import MESSAGES
 from ngi.config.values import check_values
+from ngi.files.resources import root
 from ngi.learn.callbacks import callbacks
 from tests.learn.composition import run_config
 
@@ -149,6 +151,30 @@ def test_a_value_of_the_wrong_kind_is_named(key, value, said) -> None:
         return
     with pytest.raises(ValueError, match=f"^{re.escape(f'{key}: {said}')}"):
         check_values(config)
+
+
+@pytest.mark.parametrize(
+    ("key", "said"),
+    [
+        ("sweep", "sweep: nothing reads this key; did you mean '+sweeps'?"),
+        ("sampelr", "sampelr: nothing reads this key; did you mean 'sampler'?"),
+        ("run.chekpoint_seconds", "…; did you mean 'run.checkpoint_seconds'?"),
+        ("supersampled_edges", "supersampled_edges: nothing reads this key; leave it out"),
+    ],
+)
+def test_a_key_that_nothing_reads_is_refused(key: str, said: str) -> None:
+    """It would be without effect: `+` adds whatever it is given."""
+    config = base(0).copy()
+    OmegaConf.update(config, key, 3, force_add=True)
+    with pytest.raises(ValueError, match=f"{re.escape(said.lstrip('…'))}$"):
+        check_values(config)
+
+
+def test_what_experiments_and_sweeps_add_is_no_such_key() -> None:
+    """Those are all configurations that add keys: each of them is read by what it is for."""
+    for kind, folder in (("experiment", "conf/experiment"), ("+sweeps", "sweeps")):
+        for file in sorted((root() / folder).glob("*.yaml")):
+            check_values(composed(f"{kind}={file.stem}"))
 
 
 @pytest.mark.parametrize(("variant", "key"), KEYS)

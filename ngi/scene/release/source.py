@@ -87,7 +87,7 @@ def read_source(path: Path) -> Source:
     broken XML and for files that it must not read.
     """
     if not path.is_file():
-        raise FileNotFoundError(f"{path}: no such scene file; scene.path names its folder or it")
+        raise FileNotFoundError(f"{path}: no such scene file; give a scene's folder or file")
     root, lines = read_xml(path)
     document = SceneFile(path, root, places=element_places(path, lines))
     source = Source(document, lines, parents_in(root))
