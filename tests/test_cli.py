@@ -84,6 +84,7 @@ def unread(*words: str, unbuffered: bool) -> tuple[int, str]:
         ("ngi.train", "--help"),
         ("ngi", "describe", "--help"),
         ("ngi", "describe", "mirror", "backend=scalar"),
+        ("ngi", "train", "scene=mirror", "--dry-run"),
     ],
     ids=" ".join,
 )

@@ -33,6 +33,7 @@ from ngi.config.sweep_plan import (
     shown,
     table,
 )
+from ngi.config.unread_output import readers_may_leave
 from ngi.files.durable import write_atomically
 
 NOT_COMPOSED = (HydraException, OmegaConfBaseException)
@@ -134,7 +135,8 @@ def _show_and_exit(plan: Callable[[], Sequence[Planned]]) -> NoReturn:
         runs = plan()
         if not runs:
             sys.exit("--dry-run: this sweeper chooses its runs as it goes; there is no plan")
-        print(table(runs))
+        with readers_may_leave():
+            print(table(runs))
     except NOT_COMPOSED as error:
         sys.exit(str(error))
     except Exception:

@@ -5,6 +5,7 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from tabulate import tabulate
 from tqdm import tqdm
 
 from ngi.clock.counters import Counters
-from ngi.config.build import run_components, without_seed
+from ngi.config.build import plain, run_components, without_seed
 from ngi.config.configuration import run_settings
 from ngi.config.hydra_program import MESSAGES, in_plain_words
 from ngi.config.values import check_values
@@ -98,6 +99,8 @@ def planned_run(config: DictConfig, costs: dict[str, float | None]) -> Planned:
     folder = Path(config.run.folder).resolve()
     try:
         check_values(config)
+        if "scene" in config.renderer:
+            _read(json.dumps(plain(config.scene.reader)))
         budget: Budget = instantiate(config.budget)
         state = _state(config, folder)
         done = _done(folder, budget) if state in ("interrupted", "longer") else 0.0
@@ -109,6 +112,12 @@ def planned_run(config: DictConfig, costs: dict[str, float | None]) -> Planned:
         done, left = 1.0, 0.0
     settings = {**run_settings(config, scene_hash="", costs=None), "budget": None}
     return Planned(folder, state, done, left, settings=json.dumps(settings))
+
+
+@cache
+def _read(reader: str) -> None:
+    """Makes a reader, given as JSON, to see whether the scene can be read."""
+    instantiate(OmegaConf.create({"scene": {"reader": json.loads(reader)}}))
 
 
 def _state(config: DictConfig, folder: Path) -> str:

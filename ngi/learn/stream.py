@@ -239,9 +239,9 @@ class TrainingStream:
         return batch
 
     def _generate(self, ahead: ProposalsAhead) -> Batch:
+        self.settle()  # before others are proposed, by weights that may be taken back
         ahead = self._usable(ahead)
         self.counters.count_generated(ahead.result())
-        self.settle()
         with self.clock.phase("reuse"):
             ids = self.store.add(ahead.patches(), ahead.proposals.weight)
             patches = self.store.get(ids)  # in the precision of every later look at them

@@ -59,7 +59,7 @@ class CompactPatches:
             position=_keep(patches.position, torch.float32),
             resolution=_keep(patches.resolution, torch.int64),
             large_step=_keep(patches.large_step, torch.bool),
-            world_position=_keep(world_position, torch.float32, device),
+            world_position=_keep(world_position.contiguous(), torch.float32, device),
             other_buffers=_keep(other_buffers, torch.float16, device),
             log_radiance=_keep(patches.log_radiance, torch.float16, device),
         )

@@ -205,8 +205,8 @@ def test_what_is_known_finds_what_states_do_not_tell() -> None:
 
 
 def test_losses_of_a_network_that_learns_fast_count_among_those_of_their_batch() -> None:
-    """By a tenth from batch to batch: over 60 batches by a factor of 500."""
-    assert found_by(telling, falling=0.9) > 0.5
+    """To three tenths from batch to batch: without it less than 0.7 of them are found."""
+    assert found_by(telling, falling=0.3) > 0.85
 
 
 def test_of_equal_predictions_the_less_settled_come_first() -> None:

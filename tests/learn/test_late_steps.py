@@ -10,9 +10,11 @@ from pathlib import Path
 
 import pytest
 import torch
+from torch import Tensor
 
 from ngi.learn.batch import Feedback
 from ngi.learn.step_guard import LARGEST_NORM, REFUSED_IN_A_ROW
+from ngi.render import AnalyticRenderer, RenderedPatches
 from ngi.reuse import (
     DrawingRule,
     Epochs,
@@ -238,3 +240,32 @@ def test_a_stream_whose_batches_depend_on_losses_insists_on_them(
                 stream.feedback_later(lambda: None)
             stream.feedback(answer(batch))
     assert stream.counters.iteration == 20
+
+
+def test_a_step_is_looked_at_before_other_patches_are_proposed(tmp_path: Path) -> None:
+    """In place of refused ones: a sampler may ask the network, whose step may be taken back."""
+    unseen: list[int] = []
+    when_proposed: list[int] = []
+
+    class Refused(AnalyticRenderer):
+        """Once, the fifth batch."""
+
+        def render_patches(self, states: Tensor, *, resolution: int, seed: int) -> RenderedPatches:
+            when_proposed.append(len(unseen))
+            patches = super().render_patches(states, resolution=resolution, seed=seed)
+            if len(when_proposed) == 5:
+                patches.log_radiance[0] = NAN
+            return patches
+
+    policy = FixedProbability(bootstrap_batches=3, probability=0.8)
+    renderer = Refused(dimensions=3, patch_size=8)
+    stream = make(tmp_path, renderer=renderer, rule=Epochs(), policy=policy)
+    for batch in islice(stream, 20):
+        if batch.generated:
+            stream.feedback(answer(batch))
+        else:
+            stream.settle()
+            unseen.append(stream.counters.iteration)
+            stream.feedback_later(unseen.clear)
+    assert stream.counters.batches_refused == 1
+    assert when_proposed[5] == 0

@@ -123,13 +123,13 @@ def test_a_store_that_does_not_hold_the_pool_is_refused(tmp_path: Path) -> None:
 
 def test_with_the_whole_pool_there_is_no_choice() -> None:
     sizes = [{"patches": 8, "steps": 5}, {"patches": 16, "steps": 9}]
-    found = list(plan(pool=64, sizes=sizes, choices=["a", "b"], seeds=2))
+    found = list(plan(pool=64, sizes=sizes, rounds=8, choices=["a", "b"], seeds=2))
     assert len(found) == len(set(found)) == 2 * (2 * 2 + 2)
     assert {(run.patches, run.steps) for run in found} == {(8, 5), (16, 9), (64, 5), (64, 9)}
     assert [run.choice for run in found if run.patches == 64] == ["a"] * 4
     assert [run.seed for run in found] == sorted(run.seed for run in found)
     sizes.append({"patches": 16, "steps": 5})  # as long as another: with the whole pool the same
-    found = list(plan(pool=64, sizes=sizes, choices=["a", "b"], seeds=1))
+    found = list(plan(pool=64, sizes=sizes, rounds=8, choices=["a", "b"], seeds=1))
     assert len(found) == len(set(found)) == 3 * 2 + 2
 
 
@@ -139,11 +139,12 @@ def test_with_the_whole_pool_there_is_no_choice() -> None:
         ([{"patches": 64, "steps": 5}], "64 patches of a pool of 64"),
         ([{"patches": 65, "steps": 5}], "65 patches of a pool of 64"),
         ([{"patches": 8, "steps": 5}] * 2, "'patches': 8, 'steps': 5} is given twice"),
+        ([{"patches": 7, "steps": 5}], "7 patches do not come in 8 rounds"),
     ],
 )
 def test_sizes_that_make_no_study_are_refused(sizes: list[dict[str, int]], named: str) -> None:
     with pytest.raises(ValueError, match=named):
-        list(plan(pool=64, sizes=sizes, choices=["a"], seeds=1))
+        list(plan(pool=64, sizes=sizes, rounds=8, choices=["a"], seeds=1))
 
 
 class Recorder:
@@ -271,7 +272,7 @@ def test_an_oracle_of_relative_errors_does_not_prefer_what_is_bright(recorded) -
             pool=pool,
             truth=truth,
         )
-        values = oracle.values(torch.tensor([1, 10, 900]), torch.Generator())
+        values = oracle.values(torch.tensor([1, 10, 900]), 1, torch.Generator())
         assert values.tolist() == expected
 
 
@@ -291,10 +292,10 @@ class Disagreeing(Recorder):
         return (patches > 900).float() + 0.01
 
 
-def predicted(training: Disagreeing, pool: torch.Tensor, *, candidates: int) -> Predicted:
+def predicted(training: Disagreeing, pool: torch.Tensor, *, per_patch: int) -> Predicted:
     return Predicted(
         importance=Importance(uniform_share=0.0),
-        candidates=candidates,
+        candidates_per_patch=per_patch,
         trees=16,
         depth=4,
         smallest_leaf=1,
@@ -310,7 +311,7 @@ def test_predictions_find_what_was_lost_where_something_tells_of_it(tells: bool)
     """A tenth of all numbers is lost on; of those that are drawn after the first round, a third."""
     training = Disagreeing(tells=tells)
     pool = torch.arange(1000.0)
-    choice = predicted(training, pool, candidates=1000)
+    choice = predicted(training, pool, per_patch=1000)
     runs.do(
         Run(patches=120, steps=4, choice="any", seed=0),
         training,
@@ -329,12 +330,37 @@ def test_predictions_find_what_was_lost_where_something_tells_of_it(tells: bool)
 @pytest.mark.usefixtures("recorded")
 def test_what_is_not_looked_at_is_not_chosen() -> None:
     training, pool = Disagreeing(tells=True), torch.arange(1000.0)
-    choice = predicted(training, pool, candidates=40)
+    choice = predicted(training, pool, per_patch=8)
     choice.chose(torch.arange(0, 1000, 50))
-    values = choice.values(torch.arange(500), torch.Generator().manual_seed(0))
+    values = choice.values(torch.arange(500), 5, torch.Generator().manual_seed(0))
     assert (values > 0).sum() == 40
-    again = choice.values(torch.arange(500), torch.Generator().manual_seed(1))
+    again = choice.values(torch.arange(500), 5, torch.Generator().manual_seed(1))
     assert ((values > 0) & (again > 0)).sum() < 15
+
+
+@pytest.mark.usefixtures("recorded")
+def test_what_was_looked_at_is_remembered_as_it_was_seen_and_lost_in_its_round() -> None:
+    """Eight are looked at for each of five, and described once; losses of any size are alike."""
+    training, pool = Disagreeing(tells=True), torch.arange(1000.0)
+    asked: list[int] = []
+
+    def described(patches: torch.Tensor) -> torch.Tensor:
+        asked.append(len(patches))
+        return Disagreeing.described(training, patches)
+
+    training.described = described
+    choice = predicted(training, pool, per_patch=8)
+    first = torch.arange(0, 1000, 50)
+    choice.chose(first)
+    values = choice.values(torch.arange(500), 5, torch.Generator().manual_seed(0))
+    drawn = values.nonzero().flatten()[:5]
+    training.losses = lambda patches: 1000 + patches
+    choice.chose(drawn)
+    assert asked == [20, 40]
+    seen, losses = choice.remembered
+    assert seen[:, 0].tolist() == [*first, *drawn]
+    assert losses[:20].mean().item() == pytest.approx(1)
+    assert losses[20:].mean().item() == pytest.approx(1)
 
 
 def test_without_averaged_weights_there_is_nothing_to_disagree_with(tmp_path: Path) -> None:

@@ -43,6 +43,7 @@ def run_all(config: DictConfig) -> Path:
         plan(
             pool=study.pool,
             sizes=plain(study)["sizes"],
+            rounds=study.rounds,
             choices=list(study.choices),
             seeds=study.seeds,
         )

@@ -28,8 +28,8 @@ class Choice(Protocol):
 
     importance: Importance
 
-    def values(self, candidates: Tensor, generator: torch.Generator) -> Tensor:
-        """[n], at least 0, of the patches with these numbers."""
+    def values(self, candidates: Tensor, count: int, generator: torch.Generator) -> Tensor:
+        """[n], at least 0, of the patches with these numbers, of which `count` will be drawn."""
         ...
 
     def chose(self, numbers: Tensor) -> None:
@@ -57,7 +57,7 @@ class Oracle(Choice):
         self._errors = training.relative_errors if relative else training.errors
         self._pool, self._truth = pool, truth
 
-    def values(self, candidates: Tensor, generator: torch.Generator) -> Tensor:
+    def values(self, candidates: Tensor, count: int, generator: torch.Generator) -> Tensor:
         return errors_of(candidates, self._errors, pool=self._pool, truth=self._truth)
 
 
@@ -68,7 +68,7 @@ class Predicted(Choice):
     and averaged weights disagree on it. The forest is grown through the losses of all chosen
     before, and what was known of them, as they were new.
 
-    candidates: of the patches that are left, so many are looked at in a round
+    candidates_per_patch: of the patches that are left, so many are looked at for each drawn
     truth: not looked at
     trees, depth, smallest_leaf: see `ngi.explore.forest.grow`
     """
@@ -77,7 +77,7 @@ class Predicted(Choice):
         self,
         *,
         importance: Importance,
-        candidates: int,
+        candidates_per_patch: int,
         trees: int,
         depth: int,
         smallest_leaf: int,
@@ -88,27 +88,41 @@ class Predicted(Choice):
         self.importance = importance
         self._forest = {"trees": trees, "depth": depth, "smallest_leaf": smallest_leaf}
         self._training, self._pool = training, pool
-        self._candidates = candidates
+        self._per_patch = candidates_per_patch
+        self._looked_at = torch.zeros(0, dtype=torch.int64)
+        self._known = torch.zeros(0)  # of these
         self._seen: list[Tensor] = []
         self._losses: list[Tensor] = []
 
-    def values(self, candidates: Tensor, generator: torch.Generator) -> Tensor:
-        forest = grow(torch.cat(self._seen), torch.cat(self._losses), generator, **self._forest)
-        looked_at = torch.randperm(len(candidates), generator=generator)[: self._candidates]
+    @property
+    def remembered(self) -> tuple[Tensor, Tensor]:
+        """What was known of all patches chosen so far, [m, F], and their losses, [m]."""
+        return torch.cat(self._seen), torch.cat(self._losses)
+
+    def values(self, candidates: Tensor, count: int, generator: torch.Generator) -> Tensor:
+        seen, losses = self.remembered
+        forest = grow(seen, losses, generator, **self._forest)
+        order = torch.randperm(len(candidates), generator=generator)
+        places = order[: self._per_patch * count]
+        self._looked_at = candidates[places]
+        self._known = self._described(self._looked_at)
         values = torch.zeros(len(candidates))
-        values[looked_at] = worth(self._described()[candidates[looked_at]], forest)
+        values[places] = worth(self._known, forest)
         return values
 
     def chose(self, numbers: Tensor) -> None:
         """Losses count relative to those of their round: later ones are lower."""
         parts = numbers.split(CHUNK)
         losses = torch.cat([self._training.losses(chosen(self._pool, part)) for part in parts])
-        self._seen.append(self._described()[numbers])
+        same = self._looked_at == numbers[:, None]
+        looked_at = bool(same.any(dim=1).all())  # not in the first round
+        known = self._known[same.int().argmax(dim=1)] if looked_at else self._described(numbers)
+        self._seen.append(known)
         self._losses.append(losses / losses.mean())
 
-    def _described(self) -> Tensor:
-        """[m, F]: the disagreement in units of its mean, as in runs that look."""
-        parts = torch.arange(len(self._pool)).split(CHUNK)
+    def _described(self, numbers: Tensor) -> Tensor:
+        """[n, F]: the disagreement in units of its mean, as in runs that look."""
+        parts = numbers.split(CHUNK)
         return disagreeing_relatively(
             torch.cat([self._training.described(chosen(self._pool, part)) for part in parts])
         )

@@ -32,14 +32,25 @@ class Run(NamedTuple):
 
 
 def plan(
-    *, pool: int, sizes: Sequence[Mapping[str, int]], choices: Sequence[str], seeds: int
+    *,
+    pool: int,
+    sizes: Sequence[Mapping[str, int]],
+    rounds: int,
+    choices: Sequence[str],
+    seeds: int,
 ) -> Iterator[Run]:
     """All runs, the first seed of all of them first; with the whole pool there is no choice.
 
     sizes: patches and steps of runs; the whole pool is trained on for as many steps as any of them
-    Raises ValueError for a size without a choice, and for one that is given twice.
+    Raises ValueError for a size without a choice or with fewer patches than rounds, and for one
+    that is given twice.
     """
     for size in sizes:
+        if size["patches"] < rounds:
+            raise ValueError(
+                f"ceiling.sizes: {size['patches']} patches do not come in {rounds} rounds; give "
+                f"at least as many, or fewer ceiling.rounds"
+            )
         if size["patches"] >= pool:
             raise ValueError(
                 f"ceiling.sizes: {size['patches']} patches of a pool of {pool} leave no choice; "
@@ -84,7 +95,7 @@ def do(
             drawn = torch.randperm(len(candidates), generator=generator)[:count]
             weights = torch.ones(count, dtype=torch.float64)
         else:
-            values = choice.values(candidates, generator)
+            values = choice.values(candidates, count, generator)
             drawn, weights = choice.importance.draw(values, count, generator)
         choice.chose(candidates[drawn])
         training.add(chosen(pool, candidates[drawn]), weights)
