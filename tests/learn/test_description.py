@@ -127,6 +127,21 @@ def test_weights_that_agree_everywhere_tell_nothing() -> None:
     assert description(torch.zeros(3)).at(SIDE)(states(3))[:, -1].tolist() == [1.0, 1.0, 1.0]
 
 
+def test_of_the_two_answers_the_averaged_one_describes_a_state() -> None:
+    generator = torch.Generator().manual_seed(3)
+    present, averaged = (torch.rand(3, 4, 4, 3, generator=generator) for _ in range(2))
+    describe = Description(
+        samples=PatchSamples(renderer=renderer()),
+        answers=lambda *_: (present.log1p(), averaged.log1p()),
+    ).at(SIDE)
+    found = describe(states(3))
+    logarithms = np.log(averaged.numpy() + DARK).reshape(3, 16, 3)
+    channels = renderer().layout.channels
+    means, deviations = found[:, : channels + 3], found[:, channels + 3 : 2 * (channels + 3)]
+    np.testing.assert_allclose(means[:, channels:], logarithms.mean(1), rtol=1e-4)
+    np.testing.assert_allclose(deviations[:, channels:], logarithms.std(1, ddof=1), rtol=1e-4)
+
+
 def test_errors_are_those_of_the_averaged_weights_at_few_pixels() -> None:
     """An answer that is too high by a constant of each patch, whatever the other weights say."""
     patches = make_patches(states(3))

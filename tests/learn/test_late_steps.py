@@ -161,6 +161,29 @@ def test_saved_in_between_it_goes_on_as_one_that_is_not(tmp_path: Path, stored: 
     assert_same(final, expected)
 
 
+def test_an_outlier_right_after_a_resume_is_scaled_down_as_without_it(
+    tmp_path: Path, stored: list[int]
+) -> None:
+    """The average of the gradients' norms is saved."""
+    outlier = stored[8]
+    numbers: Known = {}
+
+    def training(folder: str) -> Training:
+        harm = Harm(gradient={outlier: LARGEST_NORM / 4})
+        return Training(tmp_path / folder, late=False, numbers=numbers, harm=harm)
+
+    unbroken, first = training("a"), training("b")
+    unbroken.run(outlier)
+    first.run(outlier - 1)
+    resumed = training("b")
+    resumed.load(copy.deepcopy(first.state()))
+    resumed.run(outlier)
+    assert first.stream.counters.steps_scaled == 0
+    assert resumed.stream.counters.steps_scaled == 1
+    for part in ("network", "optimizer", "guard"):
+        assert_same(resumed.state()[part], unbroken.state()[part])
+
+
 def test_before_the_clock_pauses_the_last_step_is_looked_at(
     tmp_path: Path, stored: list[int]
 ) -> None:

@@ -1,10 +1,12 @@
 """How noisy a patch is, told by its two halves, and its loss without that."""
 
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 
 import pytest
 import torch
+from scipy import ndimage
 from torch import Tensor
 
 from ngi.explore import Importance, PredictedLoss
@@ -108,6 +110,31 @@ def test_losses_without_noise_are_closer_to_those_of_the_truth(noise: float, off
     measured = loss(truth + offset, batch.patches.log_radiance)
     corrected = without_noise(measured, noise_loss(loss, batch))
     assert (corrected - without).mean().abs() < 0.75 * (measured - without).mean().abs()
+
+
+@pytest.mark.parametrize(("side", "window"), [(8, 5), (3, 3), (1, 1)])
+def test_a_small_patch_is_blurred_over_no_more_than_itself(side: int, window: int) -> None:
+    mean, half = torch.rand(2, 2, side, side, 3, generator=torch.Generator().manual_seed(1))
+    layout = AnalyticRenderer(dimensions=1, patch_size=side).layout
+    blank = Patches.blank(2, layout=layout, dimensions=1, patch_size=side)
+    batch = Batch(
+        replace(blank, log_radiance=mean),
+        torch.arange(2),
+        generated=True,
+        current=None,
+        first_half=half,
+    )
+    compared: list[Tensor] = []
+
+    def loss(*images: Tensor) -> Tensor:
+        compared.extend(images)
+        return torch.zeros(2)
+
+    noise_loss(loss, batch)
+    blurred, noisy = compared
+    expected = ndimage.uniform_filter(mean.numpy(), size=(1, window, window, 1), mode="nearest")
+    torch.testing.assert_close(blurred, torch.from_numpy(expected))
+    torch.testing.assert_close(noisy - blurred, half - mean)
 
 
 def test_a_loss_below_the_noise_is_none() -> None:
