@@ -211,16 +211,30 @@ class PredictedFromBuffers(PredictedLoss):
     rendered: patches of one v are much alike, and where few can be had that is what they are not to
     be.
 
+    A network that has learnt next to nothing does not tell what is worth learning: at first states
+    are drawn uniformly.
+
     candidates: per batch, at least n times that number, and a multiple of it
+    uniform_first: states that are drawn uniformly before any are looked at; they have to be
+        remembered, and the first forest is grown through them
     importance: without weights, for of patches chosen in two steps they are not known
     """
 
     needs_description = True
 
     def __init__(
-        self, *, chains: int, candidates: int, importance: Importance, **others: Any
+        self,
+        *,
+        chains: int,
+        candidates: int,
+        importance: Importance,
+        memory: int,
+        uniform_first: int,
+        **others: Any,
     ) -> None:
-        super().__init__(chains=chains, candidates=candidates, importance=importance, **others)
+        super().__init__(
+            chains=chains, candidates=candidates, importance=importance, memory=memory, **others
+        )
         least = chains * PATCHES_OF_ONE_VECTOR
         if candidates % PATCHES_OF_ONE_VECTOR or candidates < least:
             raise ValueError(
@@ -229,6 +243,12 @@ class PredictedFromBuffers(PredictedLoss):
             )
         if importance.weighted:
             raise ValueError("sampler.importance.weighted: true: weights are not known; give false")
+        if not 2 * chains <= uniform_first <= memory:
+            raise ValueError(
+                f"sampler.uniform_first: {uniform_first}: give at least {2 * chains}, and no more "
+                f"than are remembered (sampler.memory: {memory})"
+            )
+        self._uniform_first = uniform_first
         self._newer_share = 0.0  # a forest grows in no time, beside paths
         self._seen_together = 2 * chains
 
@@ -239,7 +259,10 @@ class PredictedFromBuffers(PredictedLoss):
         describe: Describe,
         generator: torch.Generator,
     ) -> tuple[Tensor, Tensor, Tensor]:
-        """One of each group; by disagreement alone as long as fewer than 2 n were seen."""
+        """One of each group, after those that are drawn uniformly."""
+        if len(state.seen) < self._uniform_first:
+            first = uniform[: self.chains]
+            return first, describe(first), torch.ones(self.chains)
         vectors = uniform[::PATCHES_OF_ONE_VECTOR, :-2]
         repeated = vectors.repeat_interleave(PATCHES_OF_ONE_VECTOR, dim=0)
         candidates = torch.cat([repeated, uniform[:, -2:]], dim=1)

@@ -1,6 +1,7 @@
 """The forest, and the sampler that draws by its predictions."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ from scipy import stats
 
 from ngi.explore import Importance, PredictedFromBuffers, PredictedLoss
 from ngi.explore.forest import PRIOR, grow
+from ngi.explore.predicted import PredictedState
 from ngi.learn import TrainingStream
 from ngi.render import PocketRenderer
 from ngi.reuse import Epochs
@@ -166,11 +168,18 @@ def looking(**changes: object) -> PredictedFromBuffers:
         "candidates": 64,
         "importance": Importance(uniform_share=0.0, power=4.0),
         "memory": 256,
+        "uniform_first": 2 * CHAINS,
         "trees": 8,
         "depth": 4,
         "smallest_leaf": 2,
     }
     return PredictedFromBuffers(**{**arguments, **changes})  # type: ignore[arg-type]
+
+
+def begun(found: PredictedFromBuffers, dimensions: int) -> PredictedState:
+    """Of one that begins to look, and predicts the same everywhere."""
+    nothing = torch.zeros(2 * CHAINS, 1)
+    return replace(found.init(dimensions), seen=nothing, loss=nothing[:, 0])
 
 
 def wave(states: torch.Tensor) -> torch.Tensor:
@@ -214,7 +223,7 @@ def test_of_equal_predictions_the_less_settled_come_first() -> None:
         return torch.stack([torch.zeros(len(states)), 0.1 + 4.5 * wave(states)], dim=1)
 
     found, generator = looking(), torch.Generator().manual_seed(6)
-    state = found.init(4)
+    state = begun(found, 4)
     chosen = torch.cat(
         [found.propose(state, generator, batch=0, describe=unsettled).position for _ in range(50)]
     )
@@ -229,7 +238,7 @@ def test_candidates_are_patches_of_a_few_images() -> None:
         return torch.ones(len(states), 1)
 
     found = looking()
-    proposals = found.propose(found.init(5), torch.Generator(), batch=0, describe=describe)
+    proposals = found.propose(begun(found, 5), torch.Generator(), batch=0, describe=describe)
     groups = asked[0].unflatten(0, (16, 4))
     assert (groups[:, :, :-2] == groups[:, :1, :-2]).all()
     assert len(groups[:, 0, :-2].unique(dim=0)) == 16
@@ -243,7 +252,34 @@ def test_a_sampler_that_looks_needs_somebody_who_tells() -> None:
     assert found.needs_description
     assert not sampler().needs_description
     with pytest.raises(RuntimeError, match="64 states are to be described"):
-        found.propose(found.init(5), torch.Generator(), batch=0)
+        found.propose(begun(found, 5), torch.Generator(), batch=0)
+
+
+def test_before_a_network_knows_anything_states_are_uniform() -> None:
+    """Whatever is told of them, which is remembered for later: of these alone."""
+    found, generator = looking(uniform_first=40), torch.Generator().manual_seed(3)
+    state, chosen, asked = found.init(4), [], []
+
+    def describe(states: torch.Tensor) -> torch.Tensor:
+        asked.append(len(states))
+        return telling(states)
+
+    ids, zeros = torch.arange(CHAINS), torch.zeros(CHAINS)
+    for batch in range(20):
+        proposals = found.propose(state, generator, batch=batch, describe=describe)
+        lost = wave(proposals.position)
+        chosen.append(lost.mean().item())
+        state, _ = found.accept(state, proposals, ids, zeros, zeros, generator, losses=0.1 + lost)
+    assert asked == [CHAINS] * 10 + [64] * 10
+    assert sum(chosen[:10]) / 10 == pytest.approx(0.2, abs=0.13)
+    assert sum(chosen[10:]) / 10 > 0.8
+
+
+@pytest.mark.parametrize("uniform_first", [2 * CHAINS - 1, 257])
+def test_a_beginning_that_is_too_short_or_forgotten_is_refused(uniform_first: int) -> None:
+    named = rf"sampler\.uniform_first: {uniform_first}: give at least 8, .*sampler.memory: 256\)"
+    with pytest.raises(ValueError, match=named):
+        looking(uniform_first=uniform_first)
 
 
 @pytest.mark.parametrize("candidates", [12, 62])
@@ -265,7 +301,7 @@ def test_of_patches_of_one_image_the_better_are_drawn() -> None:
         return torch.tensor([1.0, 2.0, 3.0, 4.0]).repeat(len(states) // 4)[:, None]
 
     found = looking(candidates=4 * CHAINS, importance=Importance(uniform_share=0.0, power=2.0))
-    state, generator = found.init(3), torch.Generator().manual_seed(7)
+    state, generator = begun(found, 3), torch.Generator().manual_seed(7)
     known = [found.propose(state, generator, batch=0, describe=describe).known for _ in range(1000)]
     drawn = torch.cat([each for each in known if each is not None]).flatten().long()
     shares = drawn.bincount()[1:] / len(drawn)  # of values that are roots: 1 to 4, as they are

@@ -192,6 +192,7 @@ def stream(folder: Path) -> TrainingStream:
         candidates=16,
         importance=Importance(uniform_share=0.0, power=4.0),
         memory=64,
+        uniform_first=2 * CHAINS,
         trees=8,
         depth=4,
         smallest_leaf=1,
