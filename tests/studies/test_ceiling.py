@@ -292,9 +292,12 @@ class Disagreeing(Recorder):
         return (patches > 900).float() + 0.01
 
 
-def predicted(training: Disagreeing, pool: torch.Tensor, *, per_patch: int) -> Predicted:
+def predicted(
+    training: Disagreeing, pool: torch.Tensor, *, per_patch: int, uniform_first: int = 0
+) -> Predicted:
     return Predicted(
         importance=Importance(uniform_share=0.0),
+        uniform_first=uniform_first,
         candidates_per_patch=per_patch,
         trees=16,
         depth=4,
@@ -336,6 +339,17 @@ def test_what_is_not_looked_at_is_not_chosen() -> None:
     assert (values > 0).sum() == 40
     again = choice.values(torch.arange(500), 5, torch.Generator().manual_seed(1))
     assert ((values > 0) & (again > 0)).sum() < 15
+
+
+@pytest.mark.usefixtures("recorded")
+def test_at_first_all_are_as_likely() -> None:
+    training, pool = Disagreeing(tells=True), torch.arange(1000.0)
+    choice = predicted(training, pool, per_patch=8, uniform_first=25)
+    generator = torch.Generator().manual_seed(0)
+    choice.chose(torch.arange(0, 1000, 50))
+    assert choice.values(torch.arange(500), 5, generator).tolist() == [1] * 500
+    choice.chose(torch.arange(5))
+    assert len(choice.values(torch.arange(500), 5, generator).unique()) > 1
 
 
 @pytest.mark.usefixtures("recorded")

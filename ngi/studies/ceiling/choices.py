@@ -68,6 +68,7 @@ class Predicted(Choice):
     and averaged weights disagree on it. The forest is grown through the losses of all chosen
     before, and what was known of them, as they were new.
 
+    uniform_first: patches that are drawn uniformly before any are looked at
     candidates_per_patch: of the patches that are left, so many are looked at for each drawn
     truth: not looked at
     trees, depth, smallest_leaf: see `ngi.explore.forest.grow`
@@ -77,6 +78,7 @@ class Predicted(Choice):
         self,
         *,
         importance: Importance,
+        uniform_first: int,
         candidates_per_patch: int,
         trees: int,
         depth: int,
@@ -88,6 +90,7 @@ class Predicted(Choice):
         self.importance = importance
         self._forest = {"trees": trees, "depth": depth, "smallest_leaf": smallest_leaf}
         self._training, self._pool = training, pool
+        self._uniform_first = uniform_first
         self._per_patch = candidates_per_patch
         self._looked_at = torch.zeros(0, dtype=torch.int64)
         self._known = torch.zeros(0)  # of these
@@ -101,6 +104,8 @@ class Predicted(Choice):
 
     def values(self, candidates: Tensor, count: int, generator: torch.Generator) -> Tensor:
         seen, losses = self.remembered
+        if len(seen) < self._uniform_first:
+            return torch.ones(len(candidates))
         forest = grow(seen, losses, generator, **self._forest)
         order = torch.randperm(len(candidates), generator=generator)
         places = order[: self._per_patch * count]
@@ -115,7 +120,7 @@ class Predicted(Choice):
         parts = numbers.split(CHUNK)
         losses = torch.cat([self._training.losses(chosen(self._pool, part)) for part in parts])
         same = self._looked_at == numbers[:, None]
-        looked_at = bool(same.any(dim=1).all())  # not in the first round
+        looked_at = bool(same.any(dim=1).all())  # not where they were drawn uniformly
         known = self._known[same.int().argmax(dim=1)] if looked_at else self._described(numbers)
         self._seen.append(known)
         self._losses.append(losses / losses.mean())
