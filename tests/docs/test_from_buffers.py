@@ -63,6 +63,17 @@ def test_what_choices_take_off_is_what_the_studys_runs_say() -> None:
     assert not shown
 
 
+def test_what_uniform_patches_at_first_are_worth_is_what_the_studys_runs_say() -> None:
+    runs = of_the_study()
+    errors = ("hard_error", "hard_tail", "uniform_error", "uniform_tail")
+    rows = [
+        [change(runs, scene, choice, error) for error in errors]
+        for scene in ("bathroom", "living-room")
+        for choice in ("predicted", "predicted_after_96")
+    ]
+    assert [row[1:] for row in rows_of(PAGE, "Uniformly at first")[2:]] == rows
+
+
 def test_what_was_tried_is_what_its_runs_say() -> None:
     runs = pd.read_csv(FOLDER / "from_buffers_tried.csv").set_index(["choice", "seed"])
     rows = rows_of(PAGE, "Why this was not seen before")[2:]
@@ -92,7 +103,8 @@ FRAMES = ("hard", "uniform")
 KINDS = {
     "absolute_drawn": ("absolute, drawn", "uniform_drawn"),
     "relative_drawn": ("relative, drawn", "uniform_drawn"),
-    LOOKING: ("relative", "ours_uniform"),
+    "looked_at_once": ("at once", "ours_uniform"),
+    LOOKING: ("after 96", "ours_uniform"),
 }
 """Of runs that looked: as the table calls them, and what they are compared with."""
 
