@@ -185,6 +185,15 @@ def test_what_runs_of_spaceship_gain_is_what_they_say() -> None:
         assert list(said(PAGE, pattern)) == shown
 
 
+def test_what_uniform_frames_of_living_room_pay_is_what_its_runs_say() -> None:
+    runs = of_runs("scarce")
+    own, base = (runs.loc[method].loc["living-room"] for method in (LOOKING, "ours_uniform"))
+    for metric in ("MAPE", "DSSIM", "MAE", "LPIPS"):
+        key = f"uniform_{metric.lower()}"
+        (shown,) = said(PAGE, rf"on uniform frames of living-room .*?\b{metric}(?: is)? ([^%]+) %")
+        assert shown == ", ".join(map(tenths, own[key] / base[key] - 1)), metric
+
+
 def test_looking_takes_the_share_of_the_time_that_is_said() -> None:
     looking = of_runs("scarce").loc["looked_at_once"]
     shares = 100 * looking["explore_seconds"] / looking["run_seconds"]
