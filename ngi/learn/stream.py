@@ -239,9 +239,9 @@ class TrainingStream:
         return batch
 
     def _generate(self, ahead: ProposalsAhead) -> Batch:
-        self.settle()  # before others are proposed, by weights that may be taken back
         ahead = self._usable(ahead)
         self.counters.count_generated(ahead.result())
+        self.settle()
         with self.clock.phase("reuse"):
             ids = self.store.add(ahead.patches(), ahead.proposals.weight)
             patches = self.store.get(ids)  # in the precision of every later look at them
@@ -258,10 +258,7 @@ class TrainingStream:
         )
 
     def _usable(self, ahead: ProposalsAhead) -> ProposalsAhead:
-        """The proposals, rendered, or others where the patches of these hold NaN or Inf.
-
-        Raises FloatingPointError where others do not help.
-        """
+        """The proposals, rendered, or others for NaN or Inf; FloatingPointError where none help."""
         for _ in range(REFUSED_IN_A_ROW):
             with self.clock.phase("render"):
                 problem = ahead.unusable()
@@ -269,6 +266,7 @@ class TrainingStream:
                 return ahead
             self.counters.batches_refused += 1
             log.warning("%s; other patches are rendered instead", problem)
+            self.settle()  # others are proposed by weights that might be taken back later
             self._ahead = None
             ahead = self._propose()
         raise FloatingPointError(

@@ -16,7 +16,7 @@ from ngi.learn.captured_pass import CapturedPass
 from ngi.learn.state_before import StateBefore
 from ngi.models import L1Dssim, MuonAdam, PixelGenerator, exponential_average
 from ngi.render import AnalyticRenderer
-from ngi.reuse import DrawingRule, Epochs
+from ngi.reuse import DrawingRule, Epochs, FixedProbability
 from tests.gpu.pretended import Ledger
 from tests.learn.small_stream import make
 
@@ -37,7 +37,8 @@ def waits(
 
     The batch that a step is taken on is made in it too. 'late' counts looks at the step before.
     """
-    stream = make(folder, target=target, device="cuda", rule=rule)
+    policy = FixedProbability(bootstrap_batches=3, probability=0.75)  # stored ones in a row, too
+    stream = make(folder, target=target, device="cuda", rule=rule, policy=policy)
     module = IlluminationModule(
         network=seeded(PixelGenerator, seed=0)(
             layout=AnalyticRenderer(dimensions=3, patch_size=8).layout,

@@ -25,7 +25,7 @@ SMALL = (
     "model.directions=false",
     *("resolution.start=32", "sampler.chains=4", f"{PROTOCOL}.resolution=32"),
     *("ceiling.pool=64", "ceiling.sizes=[{patches: 16, steps: 8}]", "ceiling.rounds=2"),
-    *("ceiling.teacher_steps=4", "ceiling.seeds=1"),
+    *("ceiling.teacher_steps=4", "ceiling.seeds=1", "ceiling.choices.predicted.uniform_first=8"),
 )
 
 

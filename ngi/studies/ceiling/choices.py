@@ -71,7 +71,7 @@ class Predicted(Choice):
     uniform_first: patches that are drawn uniformly before any are looked at
     candidates_per_patch: of the patches that are left, so many are looked at for each drawn
     truth: not looked at
-    trees, depth, smallest_leaf: see `ngi.explore.forest.grow`
+    forest: trees, depth and smallest_leaf, see `ngi.explore.forest.grow`
     """
 
     def __init__(
@@ -80,15 +80,13 @@ class Predicted(Choice):
         importance: Importance,
         uniform_first: int,
         candidates_per_patch: int,
-        trees: int,
-        depth: int,
-        smallest_leaf: int,
         training: Training,
         pool: CompactPatches,
         truth: Tensor,
+        **forest: int,
     ) -> None:
         self.importance = importance
-        self._forest = {"trees": trees, "depth": depth, "smallest_leaf": smallest_leaf}
+        self._forest = forest
         self._training, self._pool = training, pool
         self._uniform_first = uniform_first
         self._per_patch = candidates_per_patch
