@@ -4,6 +4,7 @@ import inspect
 import math
 from collections.abc import Callable, Iterator
 from difflib import get_close_matches
+from functools import cache
 from pkgutil import resolve_name
 from types import NoneType, UnionType
 from typing import Any, Union, Unpack, get_args, get_origin, get_type_hints
@@ -58,19 +59,23 @@ def check_values(config: DictConfig) -> None:
 
 def _check_keys(config: DictConfig) -> None:
     """Of the whole and of `run`; the parts with a class are checked where they are made."""
-    conf = root() / "conf"
-    plain = OmegaConf.load(conf / "train.yaml")
-    groups = {folder.name for folder in conf.iterdir() if folder.is_dir()}
-    for path, node, known in (
-        ("", config, {*map(str, plain), *groups, *_OF_STUDIES}),
-        ("run.", config.run, set(map(str, plain.run))),
-    ):
+    known_in_all, known_in_run = _known_keys()
+    for path, node, known in (("", config, known_in_all), ("run.", config.run, known_in_run)):
         for key in node:
             if key not in known:
                 near = get_close_matches(str(key), {*known, "sweeps"}, n=1, cutoff=0.8)
                 name = "+sweeps" if near == ["sweeps"] else "".join([path, *near])
                 meant = f"; did you mean '{name}'?" if near else "; leave it out"
                 raise ValueError(f"{path}{key!s}: nothing reads this key{meant}")
+
+
+@cache
+def _known_keys() -> tuple[set[str], set[str]]:
+    """Of the whole configuration and of `run`; read once, however many runs a sweep has."""
+    conf = root() / "conf"
+    base = OmegaConf.load(conf / "train.yaml")
+    groups = {folder.name for folder in conf.iterdir() if folder.is_dir()}
+    return {*map(str, base), *groups, *_OF_STUDIES}, set(map(str, base.run))
 
 
 def _arguments(node: DictConfig, path: str) -> Iterator[tuple[str, Any, Any]]:

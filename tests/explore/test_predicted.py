@@ -1,4 +1,4 @@
-"""The forest, and the sampler that draws by its predictions."""
+"""The samplers that draw by a forest's predictions."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -9,7 +9,6 @@ import torch
 from scipy import stats
 
 from ngi.explore import Importance, PredictedFromBuffers, PredictedLoss
-from ngi.explore.forest import PRIOR, grow
 from ngi.explore.predicted import PredictedState
 from ngi.learn import TrainingStream
 from ngi.render import PocketRenderer
@@ -31,40 +30,6 @@ def sampler(**changes: object) -> PredictedLoss:
         "smallest_leaf": 2,
     }
     return PredictedLoss(**{**arguments, **changes})  # type: ignore[arg-type]
-
-
-def test_a_single_split_is_that_of_its_formula() -> None:
-    """Two groups: every threshold between them gives the same leaves, shrunk to the mean."""
-    points = torch.tensor([[0.1], [0.11], [0.9], [0.91]])
-    values = torch.tensor([1.0, 3.0, 10.0, 14.0])
-    forest = grow(
-        points, values, torch.Generator().manual_seed(0), trees=5, depth=1, smallest_leaf=2
-    )
-    low = (1 + 3 + PRIOR * 7) / (2 + PRIOR)
-    high = (10 + 14 + PRIOR * 7) / (2 + PRIOR)
-    found = forest(torch.tensor([[0.0], [0.1], [0.91], [1.0]]))
-    assert found.tolist() == pytest.approx([low, low, high, high])
-
-
-def test_few_variables_that_matter_are_found_among_many() -> None:
-    generator = torch.Generator().manual_seed(1)
-    points = torch.rand(1000, 30, generator=generator)
-    test = torch.rand(1000, 30, generator=generator)
-
-    def rare(states: torch.Tensor) -> torch.Tensor:
-        return ((states[:, 3] > 0.7) & (states[:, 17] < 0.3)).float()
-
-    forest = grow(points, rare(points), generator, trees=16, depth=6, smallest_leaf=3)
-    truth = rare(test).bool()
-    predicted = forest(test)
-    order = stats.mannwhitneyu(predicted[truth], predicted[~truth]).statistic
-    assert order / (truth.sum() * (~truth).sum()) > 0.95
-
-
-def test_too_few_samples_are_not_split() -> None:
-    points = torch.rand(5, 2, generator=torch.Generator().manual_seed(0))
-    forest = grow(points, torch.arange(5.0), torch.Generator(), trees=3, depth=4, smallest_leaf=3)
-    assert torch.allclose(forest(points), torch.full((5,), 2.0))
 
 
 def test_states_are_uniform_as_long_as_hardly_any_loss_is_known() -> None:
