@@ -132,12 +132,15 @@ def _trainer(config: DictConfig, run: learn.Run, callbacks: list[Callback]) -> T
     checkpoints = learn.AtomicCheckpointIO(
         identity=run.folder.identity, previous=run.folder.previous_checkpoint
     )
-    trainer: Trainer = instantiate(config.trainer)(
-        default_root_dir=run.folder.path,
-        max_steps=run.budget.maximum_steps,
-        callbacks=callbacks,
-        plugins=[checkpoints, LightningEnvironment()],  # Slurm's would save within a step
-    )
+    try:
+        trainer: Trainer = instantiate(config.trainer)(
+            default_root_dir=run.folder.path,
+            max_steps=run.budget.maximum_steps,
+            callbacks=callbacks,
+            plugins=[checkpoints, LightningEnvironment()],  # Slurm's would save within a step
+        )
+    except ValueError as error:  # Lightning does not say where it stands
+        raise ValueError(f"trainer: {error}") from error
     return trainer
 
 

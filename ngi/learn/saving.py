@@ -30,11 +30,14 @@ class BudgetAndCheckpoint(Callback):
     step is kept too: a longer run goes on from it. The first step may be such a one; then there is
     none.
 
-    every_seconds: run time between checkpoints, by the wall clock
+    every_seconds: run time between checkpoints, by the wall clock; 0 for one after every step
     every_steps: further checkpoints after so many steps; None for none
+    Raises ValueError for numbers out of range.
     """
 
     def __init__(self, run: Run, *, every_seconds: float, every_steps: int | None) -> None:
+        if every_seconds < 0:
+            raise ValueError(f"run.checkpoint_seconds: {every_seconds}: give at least 0")
         if every_steps is not None and every_steps < 1:
             raise ValueError(
                 f"run.checkpoint_steps: {every_steps}: give at least 1, or null for seconds alone"

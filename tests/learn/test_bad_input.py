@@ -42,6 +42,8 @@ def test_an_error_of_the_command_line_ends_it(
         (["sampler.chains=0"], ["chains", "0"]),
         (["evaluation.count=0"], ["evaluation.count"]),
         (["run.checkpoint_steps=0"], ["run.checkpoint_steps: 0", "null"]),
+        (["run.checkpoint_seconds=-1"], ["run.checkpoint_seconds: -1"]),
+        (["trainer.precision=fp16"], ["trainer: ", "fp16", "bf16-mixed"]),
         (["model.hidden_layers=0"], ["hidden_layers"]),
         (["tracker=wandb", "tracker.mode=maybe"], ["tracker.mode", "maybe"]),
         (["run.lpips_weights=/nowhere.pth"], ["nowhere.pth"]),

@@ -25,7 +25,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     All of it is measured in a process of its own, and in another one where a library ended that.
     """
     given = sys.argv[1:] if arguments is None else arguments
-    chosen = _parser().parse_args(given)
+    parser = _parser()
+    chosen = parser.parse_args(given)
+    for option, minutes in (
+        ("--minutes", chosen.minutes),
+        ("--training-minutes", chosen.training_minutes),
+    ):
+        if not minutes > 0:
+            parser.error(f"argument {option}: {minutes:g}: give more than 0")
     end = time.monotonic() + 60 * chosen.minutes
 
     def command() -> list[str]:

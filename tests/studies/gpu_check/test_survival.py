@@ -103,3 +103,14 @@ def test_the_next_process_has_the_time_that_is_left(
     monkeypatch.setattr("ngi.studies.gpu_check.survival._status", crash_twice)
     assert gpu_check.main(["--minutes", "2", "--output", str(tmp_path)]) == 3
     assert left == pytest.approx([2, 1.5, 1])
+
+
+@pytest.mark.parametrize("option", ["--minutes", "--training-minutes"])
+@pytest.mark.parametrize("minutes", ["-3", "0", "nan"])
+def test_no_time_at_all_is_refused(
+    option: str, minutes: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        gpu_check.main([f"{option}={minutes}", "--output", str(tmp_path)])
+    assert ended.value.code == 2
+    assert f"{option}: {minutes}: give more than 0" in capsys.readouterr().err
