@@ -16,7 +16,7 @@ def sparse(images: Tensor) -> Tensor:
 
 
 def glimpsed_buffers(states: Tensor, renderer: Renderer, *, resolution: int) -> Tensor:
-    """[n, h, w, C]: `sparse` of the buffers of patches at states [n, D + 2].
+    """[n, h, w, C]: `sparse` of the buffers of patches at states [n, D + 2], without caustics.
 
     The scene is set up once for states of the same v that follow each other.
     """
@@ -24,7 +24,7 @@ def glimpsed_buffers(states: Tensor, renderer: Renderer, *, resolution: int) -> 
     pixels = torch.stack([_pixels(p, renderer.patch_size, resolution) for p in states[:, -2:]])
     groups = pixels.split(counts.tolist())
     found = [
-        renderer.pixel_buffers(vector, group.flatten(), resolution=resolution)
+        renderer.pixel_buffers(vector, group.flatten(), resolution=resolution, caustics=False)
         for vector, group in zip(vectors, groups, strict=True)
     ]
     return torch.cat(found).view(*pixels.shape, -1)

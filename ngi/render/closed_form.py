@@ -110,7 +110,14 @@ class ClosedFormRenderer(Renderer):
         buffers, _ = self.whole_image(scene_vector, resolution)
         return buffers
 
-    def pixel_buffers(self, scene_vector: Tensor, pixels: Tensor, *, resolution: int) -> Tensor:
+    def pixel_buffers(
+        self,
+        scene_vector: Tensor,
+        pixels: Tensor,
+        *,
+        resolution: int,
+        caustics: bool = True,  # noqa: ARG002 - there are none
+    ) -> Tensor:
         corners = torch.stack([pixels % resolution, pixels // resolution], dim=-1)
         points = _pixel_centres(corners, 1, resolution).view(1, -1, 1, 2)
         buffers, _ = self.shade(scene_vector[None], points)

@@ -62,6 +62,12 @@ class IrradiancePictures:
         dr.eval(sums)
         return _resolved([mi.Float(mi.Int64(total)) * _RESOLUTION for total in sums])
 
+    def dark(self) -> mi.Float:
+        """As `of_photons` where none arrives."""
+        pictures = dr.zeros(mi.Float, 6 * CELLS * CELLS * 4)
+        dr.make_opaque(pictures)
+        return pictures
+
     def irradiance(self, pictures: mi.Float, hit: mi.SurfaceInteraction3f) -> mi.Color3f:
         """On the side of the surface that the ray has met."""
         picture, x, y, depth = self._place(hit)

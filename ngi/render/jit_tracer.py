@@ -104,16 +104,17 @@ class JitTracer(Tracer):
 
     def buffers(self, pixels: Pixels, *, samples: int) -> Pending:
         if isinstance(pixels, Window):
-            window, numbers = pixels, []
+            window, numbers, caustics = pixels, [], True
         else:
             side = pixels.resolution
             window, numbers = Window(0, 0, side, side, side), [mi.UInt32(pixels.numbers.numpy())]
+            caustics = pixels.caustics
         self._prepare(window)
         if samples not in self._points:
             self._points[samples] = _points(samples)
         view, rays = _View.of(window, samples), prod(pixels.shape) * samples
         points = self._points[samples]
-        light = [] if self._light is None else self._light.now()
+        light = [] if self._light is None else self._light.now(photons=caustics)
         sums = self._buffers(self._scene, view, numbers, *points, light, samples, rays)
         return _pending(sums, pixels.shape, samples)
 
@@ -152,9 +153,12 @@ class _PhotonLight:
         self._trace = _replayed(trace_photons, recorded=recorded)
         self._light: list[mi.Float] = []
         self._light_of = -1
+        self._dark = [caustics.pictures.dark()]
 
-    def now(self) -> list[mi.Float]:
-        """As `FirstHit.channels` takes it."""
+    def now(self, *, photons: bool) -> list[mi.Float]:
+        """As `FirstHit.channels` takes it; dark without photons."""
+        if not photons:
+            return self._dark
         if self._light_of != (changes := self._changes()):
             self._light = self._trace(self._scene, self._photons)
             self._light_of = changes

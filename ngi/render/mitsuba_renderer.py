@@ -191,12 +191,14 @@ class MitsubaRenderer(Renderer):
         self._scene.apply(scene_vector)
         return self._encode(self._whole_buffers(resolution, samples))
 
-    def pixel_buffers(self, scene_vector: Tensor, pixels: Tensor, *, resolution: int) -> Tensor:
+    def pixel_buffers(
+        self, scene_vector: Tensor, pixels: Tensor, *, resolution: int, caustics: bool = True
+    ) -> Tensor:
         require_positive(resolution=resolution)
         mi.set_variant(self._variant)
         self._scene.apply(scene_vector)
         parts = pixels.split(max(1, PATHS_PER_LAUNCH // self.buffer_samples))
-        listed = [PixelList(part, resolution) for part in parts]
+        listed = [PixelList(part, resolution, caustics=caustics) for part in parts]
         return self._encode(self._mean_buffers(listed, self.buffer_samples))
 
     def cameras(self, scene_vectors: Tensor) -> Tensor:

@@ -133,10 +133,13 @@ class Renderer(Protocol):
         """
         ...
 
-    def pixel_buffers(self, scene_vector: Tensor, pixels: Tensor, *, resolution: int) -> Tensor:
+    def pixel_buffers(
+        self, scene_vector: Tensor, pixels: Tensor, *, resolution: int, caustics: bool = True
+    ) -> Tensor:
         """[n, C] float32: what `image_buffers` has at n pixels, without making the others.
 
         pixels: [n] int64 on the CPU, of the image's, counted from 0 row by row; n >= 1
+        caustics: False leaves their light out, whose photons take most of the time of few pixels
         """
         ...
 

@@ -48,10 +48,12 @@ class PixelList:
     """Any pixels of a square image of `resolution` pixels a side.
 
     numbers: [n] int64 on the CPU, counted from 0 row by row
+    caustics: False leaves their light out of the buffers
     """
 
     numbers: Tensor
     resolution: int
+    caustics: bool = True
 
     @property
     def shape(self) -> tuple[int, ...]:

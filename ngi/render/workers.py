@@ -113,8 +113,12 @@ class WorkerRenderer(Renderer):
     ) -> Tensor:
         return self._local.image_buffers(scene_vector, resolution=resolution, samples=samples)
 
-    def pixel_buffers(self, scene_vector: Tensor, pixels: Tensor, *, resolution: int) -> Tensor:
-        return self._local.pixel_buffers(scene_vector, pixels, resolution=resolution)
+    def pixel_buffers(
+        self, scene_vector: Tensor, pixels: Tensor, *, resolution: int, caustics: bool = True
+    ) -> Tensor:
+        return self._local.pixel_buffers(
+            scene_vector, pixels, resolution=resolution, caustics=caustics
+        )
 
     def cameras(self, scene_vectors: Tensor) -> Tensor:
         return self._local.cameras(scene_vectors)

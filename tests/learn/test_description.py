@@ -28,9 +28,10 @@ class Counting(AnalyticRenderer):
 
     calls = 0
 
-    def pixel_buffers(self, scene_vector: Tensor, pixels: Tensor, *, resolution: int) -> Tensor:
+    def pixel_buffers(self, *arguments: Any, **options: Any) -> Tensor:
+        assert not options["caustics"]
         self.calls += 1
-        return super().pixel_buffers(scene_vector, pixels, resolution=resolution)
+        return super().pixel_buffers(*arguments, **options)
 
 
 def renderer() -> Counting:

@@ -259,3 +259,23 @@ def test_photons_are_traced_again_where_more_than_the_camera_moves(load, monkeyp
     fresh = {tuple(v): direct(renderer(), v) for v in vectors[:3]}  # the others repeat one
     for v, (picture, _) in zip(vectors, pictures, strict=True):
         np.testing.assert_array_equal(picture, fresh[tuple(v)])
+
+
+def test_few_pixels_can_be_had_without_any_photons(load, monkeypatch) -> None:
+    """As a renderer that knows no caustics has them; in between they are there as ever."""
+    of_class, traced = Caustics.trace, []
+    monkeypatch.setattr(Caustics, "trace", lambda *a: traced.append(a) or of_class(*a))
+    monkeypatch.setattr("ngi.render.jit_tracer.dr.freeze", lambda function, **_: function)
+    shapes = FLOOR + BULB + rectangle("wall", WALL, MIRROR)
+    pixels = torch.tensor([7, 5 * RESOLUTION + 3, RESOLUTION**2 - 1])
+    renderer, ignorant = load(shapes), load(shapes, direct="traced")
+    light = renderer.layout.slice("direct")
+    for count, v in enumerate((torch.zeros(1), torch.ones(1))):
+        without = renderer.pixel_buffers(v, pixels, resolution=RESOLUTION, caustics=False)
+        expected = ignorant.pixel_buffers(v, pixels, resolution=RESOLUTION)
+        torch.testing.assert_close(without, expected, atol=1e-5, rtol=0)
+        assert len(traced) == count
+        image = renderer.image_buffers(v, resolution=RESOLUTION).flatten(0, 1)
+        lit = renderer.pixel_buffers(v, pixels, resolution=RESOLUTION)
+        torch.testing.assert_close(lit, image[pixels], atol=1e-5, rtol=0)
+        assert lit[:, light].sum() > without[:, light].sum()
