@@ -90,7 +90,6 @@ class PredictedLoss:
                 raise ValueError(f"sampler.{name}: {value}: give at least {least}")
         self.chains = chains
         self.target = Constant()
-        self._newer_share = NEWER_SHARE
         self._seen_together = SEEN_TOGETHER
         self._candidates = candidates
         self._importance = importance
@@ -159,7 +158,7 @@ class PredictedLoss:
         loss = torch.cat([state.loss, losses[finite]])[-self._memory :]
         newer = state.newer + finite.sum()
         forest = state.forest
-        if len(seen) >= 2 * self.chains and newer >= self._newer_share * len(seen):
+        if len(seen) >= 2 * self.chains and newer >= NEWER_SHARE * len(seen):
             forest = grow(seen, self._of_their_time(loss), generator, **self._forest)
             newer = torch.tensor(0)
         moved = replace(
@@ -249,7 +248,6 @@ class PredictedFromBuffers(PredictedLoss):
                 f"than are remembered (sampler.memory: {memory})"
             )
         self._uniform_first = uniform_first
-        self._newer_share = 0.0  # a forest grows in no time, beside paths
         self._seen_together = 2 * chains
 
     def _valued(

@@ -116,6 +116,7 @@ class ClosedFormRenderer(Renderer):
         pixels: Tensor,
         *,
         resolution: int,
+        samples: int | None = None,  # noqa: ARG002 - of the pixels' centres
         caustics: bool = True,  # noqa: ARG002 - there are none
     ) -> Tensor:
         corners = torch.stack([pixels % resolution, pixels // resolution], dim=-1)

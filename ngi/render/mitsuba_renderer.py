@@ -192,14 +192,21 @@ class MitsubaRenderer(Renderer):
         return self._encode(self._whole_buffers(resolution, samples))
 
     def pixel_buffers(
-        self, scene_vector: Tensor, pixels: Tensor, *, resolution: int, caustics: bool = True
+        self,
+        scene_vector: Tensor,
+        pixels: Tensor,
+        *,
+        resolution: int,
+        samples: int | None = None,
+        caustics: bool = True,
     ) -> Tensor:
-        require_positive(resolution=resolution)
+        samples = self.buffer_samples if samples is None else samples
+        require_positive(resolution=resolution, samples=samples)
         mi.set_variant(self._variant)
         self._scene.apply(scene_vector)
-        parts = pixels.split(max(1, PATHS_PER_LAUNCH // self.buffer_samples))
+        parts = pixels.split(max(1, PATHS_PER_LAUNCH // samples))
         listed = [PixelList(part, resolution, caustics=caustics) for part in parts]
-        return self._encode(self._mean_buffers(listed, self.buffer_samples))
+        return self._encode(self._mean_buffers(listed, samples))
 
     def cameras(self, scene_vectors: Tensor) -> Tensor:
         require_told_camera(self._scene)

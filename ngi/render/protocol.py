@@ -134,11 +134,18 @@ class Renderer(Protocol):
         ...
 
     def pixel_buffers(
-        self, scene_vector: Tensor, pixels: Tensor, *, resolution: int, caustics: bool = True
+        self,
+        scene_vector: Tensor,
+        pixels: Tensor,
+        *,
+        resolution: int,
+        samples: int | None = None,
+        caustics: bool = True,
     ) -> Tensor:
         """[n, C] float32: what `image_buffers` has at n pixels, without making the others.
 
         pixels: [n] int64 on the CPU, of the image's, counted from 0 row by row; n >= 1
+        samples: as of `image_buffers`
         caustics: False leaves their light out, whose photons take most of the time of few pixels
         """
         ...

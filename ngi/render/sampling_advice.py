@@ -44,8 +44,8 @@ def sampling_advice(scene: VariableScene, materials: list[Material]) -> list[str
     if spp >= WORTH_A_LOOK:
         lines.append(
             f"method=ours_predicted_from_buffers is worth a try with the scene's {spp} samples per "
-            "pixel (budget=scarce): a little less error over all v; along a path only where the "
-            "error is in few patches"
+            "pixel (budget=scarce): a few per cent less error, most of all in the worst pixels and "
+            "where the error is in few patches"
         )
     if spp >= DEAR:
         lines.append(

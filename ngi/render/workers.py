@@ -114,10 +114,16 @@ class WorkerRenderer(Renderer):
         return self._local.image_buffers(scene_vector, resolution=resolution, samples=samples)
 
     def pixel_buffers(
-        self, scene_vector: Tensor, pixels: Tensor, *, resolution: int, caustics: bool = True
+        self,
+        scene_vector: Tensor,
+        pixels: Tensor,
+        *,
+        resolution: int,
+        samples: int | None = None,
+        caustics: bool = True,
     ) -> Tensor:
         return self._local.pixel_buffers(
-            scene_vector, pixels, resolution=resolution, caustics=caustics
+            scene_vector, pixels, resolution=resolution, samples=samples, caustics=caustics
         )
 
     def cameras(self, scene_vectors: Tensor) -> Tensor:

@@ -153,20 +153,20 @@ def wave(states: torch.Tensor) -> torch.Tensor:
 
 
 def found_by(told: Callable[[torch.Tensor], torch.Tensor], *, falling: float = 1.0) -> float:
-    """The share of `wave`'s places among the states of a run's second half.
+    """The share of `wave`'s places among the states of a run, from its 31st batch on.
 
     told: what is known of states [m, F]; falling: by which losses change from batch to batch
     """
     found, generator = looking(), torch.Generator().manual_seed(5)
     state, shares = found.init(4), []
-    for batch in range(60):
+    for batch in range(120):
         proposals = found.propose(state, generator, batch=batch, describe=told)
         lost = wave(proposals.position)
         shares.append(lost.mean().item())
         losses = (0.1 + lost) * falling**batch
         ids, zeros = torch.arange(CHAINS), torch.zeros(CHAINS)
         state, _ = found.accept(state, proposals, ids, zeros, zeros, generator, losses=losses)
-    return sum(shares[30:]) / 30
+    return sum(shares[30:]) / len(shares[30:])
 
 
 def telling(states: torch.Tensor) -> torch.Tensor:

@@ -12,7 +12,7 @@ from torch import Tensor
 from ngi.explore import Importance, PredictedFromBuffers
 from ngi.learn import Description, PatchSamples, Samples, TrainingStream, distances, features
 from ngi.learn.description import DARK
-from ngi.learn.glimpses import PIXELS_APART, glimpsed_buffers
+from ngi.learn.glimpses import PIXELS_APART, RAYS, glimpsed_buffers
 from ngi.patches import Patches
 from ngi.render import AnalyticRenderer
 from ngi.reuse import Epochs
@@ -24,12 +24,14 @@ SIDE = 40
 
 
 class Counting(AnalyticRenderer):
-    """How often the scene is set up for buffers."""
+    """How often the scene is set up for buffers, and for how many rays."""
 
     calls = 0
+    rays = 0
 
     def pixel_buffers(self, *arguments: Any, **options: Any) -> Tensor:
         assert not options["caustics"]
+        self.rays = options["samples"]
         self.calls += 1
         return super().pixel_buffers(*arguments, **options)
 
@@ -52,6 +54,14 @@ def test_a_glimpse_is_of_the_pixels_that_the_patch_will_have() -> None:
     found = glimpsed_buffers(looked_at, renderer(), resolution=SIDE)
     assert found.shape[:3] == (6, 4, 4)
     assert torch.equal(found, patches.buffers[:, ::PIXELS_APART, ::PIXELS_APART])
+
+
+@pytest.mark.parametrize(("rays_of_patches", "rays"), [(16, RAYS), (2, 2)])
+def test_a_glimpse_has_few_rays(rays_of_patches: int, rays: int) -> None:
+    counting = renderer()
+    counting.buffer_samples = rays_of_patches
+    glimpsed_buffers(states(1), counting, resolution=SIDE)
+    assert counting.rays == rays
 
 
 def test_patches_of_one_scene_vector_are_looked_at_together() -> None:

@@ -67,6 +67,10 @@ def test_listed_pixels_are_those_of_the_image(renderer, monkeypatch) -> None:
     image = renderer.image_buffers(V, resolution=48).flatten(0, 1)
     listed = renderer.pixel_buffers(V, PIXELS, resolution=48)
     torch.testing.assert_close(listed, image[PIXELS], atol=1e-5, rtol=0)
+    other = renderer.image_buffers(V, resolution=48, samples=4).flatten(0, 1)
+    listed_other = renderer.pixel_buffers(V, PIXELS, resolution=48, samples=4)
+    torch.testing.assert_close(listed_other, other[PIXELS], atol=1e-5, rtol=0)
+    assert not torch.equal(listed_other, listed)
     assert listed[:, :3].std(dim=0).max() > 0.01
     monkeypatch.setattr("ngi.render.mitsuba_renderer.PATHS_PER_LAUNCH", 2)
     torch.testing.assert_close(renderer.pixel_buffers(V, PIXELS, resolution=48), listed)
