@@ -54,6 +54,19 @@ def here(gate):
     gate.unlink(missing_ok=True)
 
 
+def test_few_pixels_are_had_as_they_are_asked_for(two, monkeypatch) -> None:
+    asked = []
+    monkeypatch.setattr(
+        two._local, "pixel_buffers", lambda *given, **options: asked.append((given, options))
+    )
+    v, pixels = torch.zeros(3), torch.tensor([1])
+    two.pixel_buffers(v, pixels, resolution=9, samples=4, caustics=False)
+    two.pixel_buffers(v, pixels, resolution=9)
+    with_all = {"resolution": 9, "samples": None, "caustics": True}
+    few = {"resolution": 9, "samples": 4, "caustics": False}
+    assert asked == [((v, pixels), few), ((v, pixels), with_all)]
+
+
 def test_processes_give_the_same(two, here) -> None:
     for seed in range(3):
         given = states(40, seed)
