@@ -101,6 +101,7 @@ def errors_of(runs: pd.DataFrame) -> list[pd.Series]:
 
 FRAMES = ("hard", "uniform")
 OTHERS = {
+    "sobol": ("a Sobol sequence (`method=ours`), nothing looked at", "ours_uniform"),
     "looked_quickly": ("as now: without photons, with few rays and forests", "ours_uniform"),
     "looked_without_photons": ("without photons", "ours_uniform"),
     "absolute_drawn": ("by absolute errors, batches by chance", "uniform_drawn"),
