@@ -104,17 +104,17 @@ class JitTracer(Tracer):
 
     def buffers(self, pixels: Pixels, *, samples: int) -> Pending:
         if isinstance(pixels, Window):
-            window, numbers, caustics = pixels, [], True
+            window, numbers = pixels, []
         else:
             side = pixels.resolution
             window, numbers = Window(0, 0, side, side, side), [mi.UInt32(pixels.numbers.numpy())]
-            caustics = pixels.caustics
         self._prepare(window)
         if samples not in self._points:
             self._points[samples] = _points(samples)
         view, rays = _View.of(window, samples), prod(pixels.shape) * samples
         points = self._points[samples]
-        light = [] if self._light is None else self._light.now(photons=caustics)
+        photons = isinstance(pixels, Window) or pixels.caustics
+        light = [] if self._light is None else self._light.now(photons=photons)
         sums = self._buffers(self._scene, view, numbers, *points, light, samples, rays)
         return _pending(sums, pixels.shape, samples)
 

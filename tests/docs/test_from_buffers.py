@@ -203,3 +203,10 @@ def test_what_uniform_frames_of_living_room_pay_is_what_its_runs_say() -> None:
         key = f"uniform_{metric.lower()}"
         (shown,) = said(PAGE, rf"on uniform frames of living-room .*?\b{metric}(?: is)? ([^%]+) %")
         assert shown == ", ".join(map(tenths, own[key] / base[key] - 1)), metric
+
+
+def test_looking_takes_the_share_of_the_time_that_is_said() -> None:
+    runs = of_runs("scarce").loc["looked_quickly"]
+    shares = 100 * (runs.explore_seconds / runs.run_seconds).groupby("scene").mean()
+    shown = said(PAGE, r"looking takes (\d\.\d) % on living-room and (\d\.\d) % on sphere-caustic")
+    assert list(shown) == [f"{shares[scene]:.1f}" for scene in ("living-room", "sphere-caustic")]
