@@ -75,7 +75,13 @@ class IlluminationModule(LightningModule):
         )
 
     def configure_optimizers(self) -> torch.optim.Optimizer:
-        return self._make_optimizer(self.network.parameters())
+        """ValueError that names the config's group: PyTorch says a number and what it is of."""
+        try:
+            return self._make_optimizer(self.network.parameters())
+        except ValueError as error:
+            if str(error).startswith("optimizer."):
+                raise
+            raise ValueError(f"optimizer: {error}") from error
 
     def rehearse(self, patches: Patches) -> None:
         """Makes a training step's computations without training, before any long work.
@@ -85,7 +91,7 @@ class IlluminationModule(LightningModule):
         target can not score, a wrong learning rate.
         """
         self._check_inputs(patches)
-        optimizer = self._make_optimizer(self.network.parameters())
+        optimizer = self.configure_optimizers()
         with self.learner.scorer.watch(patches, patches, optimizer) as score:
             losses, prediction = self.learner.losses(patches)
         score(prediction, losses)

@@ -51,7 +51,7 @@ def test_an_error_of_the_command_line_ends_it(
         (["reuse.when_late=maybe"], ["reuse.when_late", "maybe"]),
         (["optimizer._target_=torch.optim.AdamW"], ["optimizer.weight_decay is 0.01"]),
         (["optimizer._target_=torch.optim.SGD"], ["SGD", "optimizer=muon"]),
-        (["optimizer.lr=-1"], ["learning rate", "-1"]),
+        (["optimizer.lr=-1"], ["optimizer: Invalid learning rate: -1"]),
         (["optimizer=muon", "optimizer.momentum=1"], ["optimizer.momentum: 1"]),
         (
             ["schedule=warmup_stable_decay", "schedule.warmup_steps=30", "budget.steps=12"],
@@ -72,6 +72,11 @@ def test_each_error_names_its_key_and_value(
         assert word in str(raised.value)
     assert not (tmp_path / "run" / "result.json").exists()
     assert not (tmp_path / "run" / "steps.csv").exists()
+
+
+def test_a_key_that_an_optimiser_names_is_not_named_again(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="^optimizer.lr: -1 is no learning rate$"):
+        train(configuration(tmp_path, "optimizer=muon", "optimizer.lr=-1"))
 
 
 def test_an_unwritable_folder_is_refused_before_anything_is_rendered(tmp_path: Path) -> None:
