@@ -6,7 +6,8 @@ Tensors only: neither renderer nor network is known here.
 from ngi.explore.acceptance import Acceptance, Always, Greedy, Metropolis
 from ngi.explore.chains import ChainInfo, ChainState, MarkovChains
 from ngi.explore.importance import Importance
-from ngi.explore.predicted import PredictedFromBuffers, PredictedLoss
+from ngi.explore.predicted import PredictedLoss
+from ngi.explore.predicted_from_buffers import PredictedFromBuffers
 from ngi.explore.proposals import (
     Describe,
     ExponentialPerturbation,

@@ -3,7 +3,6 @@
 # ruff: noqa: ARG002 - a sampler is given more than it need look at
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import torch
 from torch import Tensor
@@ -19,9 +18,6 @@ NEWER_SHARE = 1 / 8
 
 SEEN_TOGETHER = 64
 """Losses that the network had as much training for, roughly."""
-
-PATCHES_OF_ONE_VECTOR = 4
-"""Of a batch's candidates, where they are looked at."""
 
 
 @dataclass(frozen=True)
@@ -91,6 +87,7 @@ class PredictedLoss:
         self.chains = chains
         self.target = Constant()
         self._seen_together = SEEN_TOGETHER
+        self._grown_from = 2 * chains
         self._candidates = candidates
         self._importance = importance
         self._memory = memory
@@ -119,9 +116,7 @@ class PredictedLoss:
         describe: Describe = nothing_known,
     ) -> Proposals:
         """A batch of states, uniform ones as long as fewer than 2 n were seen."""
-        shape = self._candidates, state.position.shape[1]
-        candidates = torch.empty(shape).uniform_(generator=generator)
-        candidates, known, values = self._valued(state, candidates, describe, generator)
+        candidates, known, values = self._valued(state, batch, describe, generator)
         chosen, weights = self._importance.draw(values, self.chains, generator)
         return Proposals(
             position=candidates[chosen],
@@ -133,11 +128,13 @@ class PredictedLoss:
     def _valued(
         self,
         state: PredictedState,
-        uniform: Tensor,
+        batch: int,
         describe: Describe,
         generator: torch.Generator,
     ) -> tuple[Tensor, Tensor, Tensor]:
-        """Candidates [k, S] of uniform states [m, S], what is known of them [k, F], values [k]."""
+        """Candidates of a batch [k, S], what is known of them [k, F], values [k]."""
+        shape = self._candidates, state.position.shape[1]
+        uniform = torch.empty(shape).uniform_(generator=generator)
         return uniform, uniform, state.forest(uniform)
 
     def accept(
@@ -158,7 +155,7 @@ class PredictedLoss:
         loss = torch.cat([state.loss, losses[finite]])[-self._memory :]
         newer = state.newer + finite.sum()
         forest = state.forest
-        if len(seen) >= 2 * self.chains and newer >= NEWER_SHARE * len(seen):
+        if len(seen) >= self._grown_from and newer >= NEWER_SHARE * len(seen):
             forest = grow(seen, self._of_their_time(loss), generator, **self._forest)
             newer = torch.tensor(0)
         moved = replace(
@@ -187,90 +184,3 @@ class PredictedLoss:
         first = (torch.arange(len(losses)) - count // 2).clamp(0, len(losses) - count)
         mean = losses[first[:, None] + torch.arange(count)].mean(dim=1)
         return torch.where(mean > 0, losses / mean, 0.0)
-
-
-def worth(known: Tensor, forest: Forest) -> Tensor:
-    """[m] of states of which [m, F] is `known`, the last number the network's disagreement there.
-
-    The predicted loss times the root of the disagreement: where that is high the network is still
-    learning, while a loss can be high by what it never learns.
-    """
-    return forest(known) * known[:, -1].sqrt()
-
-
-class PredictedFromBuffers(PredictedLoss):
-    """`PredictedLoss` where patches are dear, so that there is time to look before one is traced.
-
-    The forest is grown through what `describe` tells of the states (of a run: buffers, v, and how
-    far the network's present and averaged weights disagree) in place of the states themselves, and
-    they are drawn by `worth`.
-
-    What sets a scene up for one patch shows others of the same v, too: candidates are groups of
-    `PATCHES_OF_ONE_VECTOR` that differ in the patch position. Of each group at most one is
-    rendered: patches of one v are much alike, and where few can be had that is what they are not to
-    be.
-
-    A network that has learnt next to nothing does not tell what is worth learning: at first states
-    are drawn uniformly.
-
-    candidates: per batch, at least n times that number, and a multiple of it
-    uniform_first: states that are drawn uniformly before any are looked at; they have to be
-        remembered, and the first forest is grown through them
-    importance: without weights, for of patches chosen in two steps they are not known
-    """
-
-    needs_description = True
-
-    def __init__(
-        self,
-        *,
-        chains: int,
-        candidates: int,
-        importance: Importance,
-        memory: int,
-        uniform_first: int,
-        **others: Any,
-    ) -> None:
-        super().__init__(
-            chains=chains, candidates=candidates, importance=importance, memory=memory, **others
-        )
-        least = chains * PATCHES_OF_ONE_VECTOR
-        if candidates % PATCHES_OF_ONE_VECTOR or candidates < least:
-            raise ValueError(
-                f"sampler.candidates: {candidates}: give a multiple of {PATCHES_OF_ONE_VECTOR} and "
-                f"at least {least}: so many are of one scene vector, of which one is chosen"
-            )
-        if importance.weighted:
-            raise ValueError("sampler.importance.weighted: true: weights are not known; give false")
-        if not 2 * chains <= uniform_first <= memory:
-            raise ValueError(
-                f"sampler.uniform_first: {uniform_first}: give at least {2 * chains}, and no more "
-                f"than are remembered (sampler.memory: {memory})"
-            )
-        self._uniform_first = uniform_first
-        self._seen_together = 2 * chains
-
-    def _valued(
-        self,
-        state: PredictedState,
-        uniform: Tensor,
-        describe: Describe,
-        generator: torch.Generator,
-    ) -> tuple[Tensor, Tensor, Tensor]:
-        """One of each group, after those that are drawn uniformly."""
-        if len(state.seen) < self._uniform_first:
-            first = uniform[: self.chains]
-            return first, describe(first), torch.ones(self.chains)
-        vectors = uniform[::PATCHES_OF_ONE_VECTOR, :-2]
-        repeated = vectors.repeat_interleave(PATCHES_OF_ONE_VECTOR, dim=0)
-        candidates = torch.cat([repeated, uniform[:, -2:]], dim=1)
-        known = describe(candidates)
-        values = worth(known, state.forest)
-        best = self._one_of_each(values.view(-1, PATCHES_OF_ONE_VECTOR), generator)
-        return candidates[best], known[best], values[best]
-
-    def _one_of_each(self, values: Tensor, generator: torch.Generator) -> Tensor:
-        """[g] candidates, one of each group, drawn by their values [g, k]."""
-        first = torch.arange(0, values.numel(), values.shape[1])
-        drawn = [self._importance.draw(group, 1, generator)[0] for group in values]
-        return first + torch.cat(drawn)

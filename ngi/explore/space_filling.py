@@ -12,46 +12,62 @@ from torch.quasirandom import SobolEngine
 from ngi.explore.proposals import ProposalDistribution, Proposals
 
 
-class Sobol(ProposalDistribution):
-    """A scrambled Sobol sequence: batch b of n points holds its points n b to n (b + 1) - 1.
+class SobolSequence:
+    """A scrambled Sobol sequence, of which any stretch can be had.
 
     Direction numbers of Joe and Kuo (2008), scrambled by random linear maps and a digital shift
-    (Matousek 1998), as PyTorch does it. Which points a batch gets depends on its number alone, so
-    that there is no place in the sequence that a checkpoint would have to hold.
+    (Matousek 1998), as PyTorch does it.
 
     seed: the run's. The scrambling is seeded with a number drawn from it: seeded with the same one,
         PyTorch's sequences of all dimensions begin with the same point, and the run whose seed is
         that of the test frames (`ngi.evaluate.evaluation_frames`) would be trained on the first.
     """
 
-    starts_chains = True
-
     def __init__(self, *, seed: int) -> None:
         generator = torch.Generator().manual_seed(seed)
         self._seed = int(torch.randint(2**31, (), generator=generator))
         self._engine: SobolEngine | None = None  # kept to save time, nothing else
 
-    def propose(self, position: Tensor, generator: torch.Generator, *, batch: int) -> Proposals:
-        """Nothing is drawn from `generator`.
+    def points(self, first: int, count: int, dimensions: int) -> Tensor:
+        """Those from number `first` on, [count, dimensions] float32 in [0, 1).
 
         Raises ValueError for more than 21,201 dimensions.
         """
-        count, dimensions = position.shape
         if dimensions > SobolEngine.MAXDIM:
             raise ValueError(
-                f"sampler=sobol: {dimensions} dimensions (the scene's variables and the patch "
-                f"position): the sequence is known for at most {SobolEngine.MAXDIM}; choose "
+                f"{dimensions} dimensions (the scene's variables and the patch position): a Sobol "
+                f"sequence is known for at most {SobolEngine.MAXDIM}; choose "
                 "sampler=latin_hypercube"
             )
         if self._engine is None or self._engine.dimension != dimensions:
             self._engine = SobolEngine(dimensions, scramble=True, seed=self._seed)
-        skipped = batch * count - self._engine.num_generated
+        skipped = first - self._engine.num_generated
         if skipped < 0:
             self._engine.reset()
-            skipped = batch * count
+            skipped = first
         if skipped > 0:
             self._engine.fast_forward(skipped)
-        return _large_steps(self._engine.draw(count, dtype=torch.float64), position)
+        return _single_precision(self._engine.draw(count, dtype=torch.float64))
+
+
+class Sobol(ProposalDistribution):
+    """A `SobolSequence`: batch b of n points holds its points n b to n (b + 1) - 1.
+
+    Which points a batch gets depends on its number alone, so that there is no place in the sequence
+    that a checkpoint would have to hold.
+
+    seed: the run's
+    """
+
+    starts_chains = True
+
+    def __init__(self, *, seed: int) -> None:
+        self._sequence = SobolSequence(seed=seed)
+
+    def propose(self, position: Tensor, generator: torch.Generator, *, batch: int) -> Proposals:
+        """Nothing is drawn from `generator`. Raises ValueError for more than 21,201 dimensions."""
+        count, dimensions = position.shape
+        return _large_steps(self._sequence.points(batch * count, count, dimensions), position)
 
 
 class LatinHypercube(ProposalDistribution):
@@ -69,13 +85,16 @@ class LatinHypercube(ProposalDistribution):
             (2, *position.shape), dtype=torch.float64, device=position.device
         ).uniform_(generator=generator)
         interval = keys.argsort(dim=0)  # of each variable a permutation of its own
-        return _large_steps((interval + offset) / len(position), position)
+        return _large_steps(_single_precision((interval + offset) / len(position)), position)
 
 
 def _large_steps(points: Tensor, like: Tensor) -> Proposals:
-    """Points [n, S] float64 in [0, 1), rounded down, so that none becomes 1 or changes its cell."""
-    position = (points * 2**24).floor() / 2**24
     return Proposals(
-        position=position.to(like),
+        position=points.to(like),
         large_step=torch.ones(len(points), dtype=torch.bool, device=like.device),
     )
+
+
+def _single_precision(points: Tensor) -> Tensor:
+    """Float64 in [0, 1) rounded down, so that none becomes 1 or changes its cell."""
+    return ((points * 2**24).floor() / 2**24).float()

@@ -75,7 +75,7 @@ def test_each_error_names_its_key_and_value(
 
 
 def test_a_key_that_an_optimiser_names_is_not_named_again(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="^optimizer.lr: -1 is no learning rate$"):
+    with pytest.raises(ValueError, match=r"^optimizer\.lr: -1 is no learning rate$"):
         train(configuration(tmp_path, "optimizer=muon", "optimizer.lr=-1"))
 
 

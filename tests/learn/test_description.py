@@ -199,6 +199,7 @@ def stream(folder: Path) -> TrainingStream:
     """Whose weights disagree where a buffer says so."""
     made = renderer()
     sampler = PredictedFromBuffers(
+        seed=1,
         chains=CHAINS,
         candidates=16,
         importance=Importance(uniform_share=0.0, power=4.0),

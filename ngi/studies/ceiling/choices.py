@@ -12,7 +12,7 @@ from torch import Tensor
 
 from ngi.explore import Importance
 from ngi.explore.forest import grow
-from ngi.explore.predicted import worth
+from ngi.explore.predicted_from_buffers import worth
 from ngi.learn import disagreeing_relatively
 from ngi.patches import Patches
 from ngi.reuse import CompactPatches
