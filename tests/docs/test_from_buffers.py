@@ -102,8 +102,10 @@ def errors_of(runs: pd.DataFrame) -> list[pd.Series]:
 FRAMES = ("hard", "uniform")
 OTHERS = {
     "sobol": ("a Sobol sequence (`method=ours`), nothing looked at", "ours_uniform"),
-    "looked_quickly": ("as now: without photons, with few rays and forests", "ours_uniform"),
-    "looked_without_photons": ("without photons", "ours_uniform"),
+    "uniform_again": ("uniform sampling, again on another machine", "ours_uniform"),
+    "looked_at_random": ("random candidates, photons, many rays and forests", "ours_uniform"),
+    "looked_quickly": ("random candidates, few rays and forests", "ours_uniform"),
+    "looked_without_photons": ("random candidates, many rays and forests", "ours_uniform"),
     "absolute_drawn": ("by absolute errors, batches by chance", "uniform_drawn"),
     "relative_drawn": ("by relative errors, batches by chance", "uniform_drawn"),
     "looked_at_once": ("at once", "ours_uniform"),
@@ -198,7 +200,7 @@ def test_what_is_said_of_all_runs_is_the_last_row_of_their_table(page: str) -> N
 
 def test_what_uniform_frames_of_living_room_pay_is_what_its_runs_say() -> None:
     runs = of_runs("scarce")
-    own, base = (runs.loc[method].loc["living-room"] for method in (LOOKING, "ours_uniform"))
+    own, base = (runs.loc[way].loc["living-room"] for way in ("looked_at_random", "ours_uniform"))
     for metric in ("MAPE", "DSSIM", "MAE", "LPIPS"):
         key = f"uniform_{metric.lower()}"
         (shown,) = said(PAGE, rf"on uniform frames of living-room .*?\b{metric}(?: is)? ([^%]+) %")
@@ -206,7 +208,7 @@ def test_what_uniform_frames_of_living_room_pay_is_what_its_runs_say() -> None:
 
 
 def test_looking_takes_the_share_of_the_time_that_is_said() -> None:
-    runs = of_runs("scarce").loc["looked_quickly"]
+    runs = of_runs("scarce").loc[LOOKING]
     shares = 100 * (runs.explore_seconds / runs.run_seconds).groupby("scene").mean()
     shown = said(PAGE, r"looking takes (\d\.\d) % on living-room and (\d\.\d) % on sphere-caustic")
     assert list(shown) == [f"{shares[scene]:.1f}" for scene in ("living-room", "sphere-caustic")]
