@@ -39,12 +39,12 @@ class PredictedFromBuffers(PredictedLoss):
     the positions' range apart, one in each quarter of it.
 
     A network that has learnt next to nothing does not tell what is worth learning: at first states
-    are the points of that sequence.
+    are taken as they come in that sequence.
 
     seed: the run's
     candidates: per batch, at least 4 n, and a multiple of 4
-    uniform_first: states that are rendered before any are looked at; they have to be remembered,
-        and the first forest is grown through them
+    uniform_first: states that are taken as they come before any are chosen; they have to be
+        remembered, and the first forest is grown through them
     importance: without weights, for of patches chosen in two steps they are not known
     """
 
@@ -91,7 +91,7 @@ class PredictedFromBuffers(PredictedLoss):
         describe: Describe,
         generator: torch.Generator,
     ) -> tuple[Tensor, Tensor, Tensor]:
-        """One of each group, after those that are rendered unseen."""
+        """One of each group, after those that are taken as they come."""
         if len(state.seen) < self._uniform_first:
             first = self._points(state, batch, self.chains)
             return first, describe(first), torch.ones(self.chains)

@@ -198,6 +198,31 @@ def test_what_is_said_of_all_runs_is_the_last_row_of_their_table(page: str) -> N
     assert [*shown] == [*expected[0], *expected[1]]
 
 
+def percent(changes: pd.Series) -> str:
+    """As prose has the mean of changes."""
+    mean, interval = mean_of(changes).split(" (")[0].split(" ± ")
+    return f"{mean} % ± {interval}"
+
+
+def test_what_spreading_and_looking_gain_is_what_the_runs_that_both_have_say() -> None:
+    runs = of_runs("scarce")
+    pairs = runs.loc["sobol"].index.intersection(runs.loc[LOOKING].index)
+    sequence, looked, both = (
+        [change.loc[pairs] for change in changes_of(runs, method, "ours_uniform")]
+        for method in ("sobol", "looked_at_random", LOOKING)
+    )
+    for frames, shown in (
+        (0, r"has (−[^,]+) on hard frames, where random candidates have (\S+ % ± \S+) and both"),
+        (2, r"on uniform frames (\S+ % ± [\d.]+), (\S+ % ± \S+) and"),
+    ):
+        assert said(PAGE, shown) == (percent(sequence[frames]), percent(looked[frames]))
+    added = [(1 + b) / (1 + s) - 1 for b, s in zip(both, sequence, strict=True)]
+    shown = r"\((\d) pairs\)\. Against the sequence alone both together have (.+?), of which"
+    count, listed = said(PAGE, shown)
+    assert count == str(len(pairs))
+    assert listed.replace(" and ", ", ").split(", ") == [percent(change) for change in added]
+
+
 def test_what_uniform_frames_of_living_room_pay_is_what_its_runs_say() -> None:
     runs = of_runs("scarce")
     own, base = (runs.loc[way].loc["living-room"] for way in ("looked_at_random", "ours_uniform"))

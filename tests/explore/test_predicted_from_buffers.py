@@ -112,7 +112,7 @@ def test_candidates_are_four_patches_each_of_a_few_images() -> None:
 
 
 def test_what_is_looked_at_goes_through_one_sequence() -> None:
-    """So does what is rendered unseen: equal intervals of a variable hold as many points each."""
+    """So does what is not chosen yet: equal intervals of a variable hold as many points each."""
     first, *others = looks(looking(uniform_first=32), batches=38, dimensions=5)
     asked = torch.cat([first, *others[:7], *[group[::4] for group in others[7:]]])
     assert torch.equal(asked, SobolSequence(seed=1).points(0, 32 + 30 * 16, 5))
