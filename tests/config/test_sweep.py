@@ -71,7 +71,7 @@ def test_in_the_end_it_says_what_failed_and_why(finished: tuple[Path, str]) -> N
     end = output[output.index("2 runs of this sweep failed:") :].splitlines()
     assert len(end) == 3
     for seed, line in enumerate(end[1:]):
-        assert line == f"  outputs/steps/-1-{seed}: Invalid learning rate: -1"
+        assert line == f"  outputs/steps/-1-{seed}: optimizer: Invalid learning rate: -1"
     assert not [*folder.rglob(".sweep-*")]
 
 
