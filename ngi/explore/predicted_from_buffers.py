@@ -79,7 +79,6 @@ class PredictedFromBuffers(PredictedLoss):
                 f"than are remembered (sampler.memory: {memory})"
             )
         self._vectors = candidates // of_one_vector
-        self._uniform_first = uniform_first
         self._seen_together = 2 * chains
         self._grown_from = uniform_first
         self._sequence = SobolSequence(seed=seed)
@@ -92,7 +91,7 @@ class PredictedFromBuffers(PredictedLoss):
         generator: torch.Generator,
     ) -> tuple[Tensor, Tensor, Tensor]:
         """One of each group, after those that are taken as they come."""
-        if len(state.seen) < self._uniform_first:
+        if len(state.seen) < self._grown_from:
             first = self._points(state, batch, self.chains)
             return first, describe(first), torch.ones(self.chains)
         points = self._points(state, batch, self._vectors)
@@ -105,7 +104,7 @@ class PredictedFromBuffers(PredictedLoss):
 
     def _points(self, state: PredictedState, batch: int, count: int) -> Tensor:
         """[count, S] of the sequence: those after what earlier batches had."""
-        looked_at = max(0, batch - math.ceil(self._uniform_first / self.chains))
+        looked_at = max(0, batch - math.ceil(self._grown_from / self.chains))
         first = (batch - looked_at) * self.chains + looked_at * self._vectors
         return self._sequence.points(first, count, state.position.shape[1])
 

@@ -35,8 +35,8 @@ class SobolSequence:
         """
         if dimensions > SobolEngine.MAXDIM:
             raise ValueError(
-                f"{dimensions} dimensions (the scene's variables and the patch position): a Sobol "
-                f"sequence is known for at most {SobolEngine.MAXDIM}; choose "
+                f"sampler: {dimensions} dimensions (the scene's variables and the patch position): "
+                f"a Sobol sequence is known for at most {SobolEngine.MAXDIM}; choose "
                 "sampler=latin_hypercube"
             )
         if self._engine is None or self._engine.dimension != dimensions:

@@ -89,6 +89,7 @@ def test_without_weights_nothing_weighs() -> None:
     found = sampler(importance=Importance(uniform_share=0.5))
     proposals = found.propose(found.init(3), torch.Generator(), batch=0)
     assert proposals.weight is None
+    assert not found.needs_description  # and nobody is asked what is known
 
 
 def test_the_oldest_and_what_is_not_finite_are_forgotten() -> None:

@@ -105,6 +105,7 @@ def test_candidates_are_four_patches_each_of_a_few_images() -> None:
     groups = looks(looking(), batches=3, dimensions=5)[-1].unflatten(0, (16, 4))
     assert (groups[:, :, :-2] == groups[:, :1, :-2]).all()
     assert len(groups[:, 0, :-2].unique(dim=0)) == 16
+    assert len(groups[..., -2:].flatten(0, 1).unique(dim=0)) == 64
     quarters = (groups[:, :, -2:] >= 0.5).long() @ torch.tensor([1, 2])
     assert all(sorted(group) == [0, 1, 2, 3] for group in quarters.tolist())
     within = groups[..., -2:] % 0.5

@@ -147,6 +147,6 @@ def test_five_thousand_dimensions(proposal) -> None:
 
 
 def test_more_dimensions_than_sobols_sequence_has_are_refused() -> None:
-    with pytest.raises(ValueError, match=r"21202 dimensions.* at most 21201; .*lat"):
+    with pytest.raises(ValueError, match=r"sampler: 21202 dimensions.* at most 21201; .*lat"):
         batches(Sobol(seed=0), count=1, dimensions=21_202)
     batches(LatinHypercube(), count=1, dimensions=21_202)
