@@ -1,10 +1,11 @@
 from dataclasses import dataclass
 
+import numpy as np
 import pytest
 import torch
 from torch import nn
 
-from ngi.denoise import denoised
+from ngi.denoise import denoised, guides
 from ngi.learn import PatchSamples, network_of, seeded
 from ngi.patches import BufferLayout, MovingPoints
 from ngi.render import AnalyticRenderer
@@ -45,6 +46,29 @@ def test_targets_are_the_mean_of_traced_and_denoised_radiance(share) -> None:
     torch.testing.assert_close(result.log_radiance.expm1(), expected, atol=1e-6, rtol=1e-5)
     assert torch.equal(result.buffers, plain.buffers)
     assert result.paths == plain.paths
+
+
+@pytest.mark.parametrize(("patch_size", "border"), [(16, 8), (4, 3)])
+def test_a_denoiser_is_given_what_a_mirror_at_the_edges_would_show(patch_size, border) -> None:
+    """As NumPy continues images; a patch of 4 pixels has no more than 3 to show."""
+    renderer = AnalyticRenderer(dimensions=3, patch_size=patch_size)
+    traced = renderer.render_patches(states(renderer), resolution=64, seed=1)
+    given = []
+
+    def keep(radiance, albedo, normal) -> torch.Tensor:
+        given.append((radiance, albedo, normal))
+        return radiance
+
+    result = denoised(traced, denoiser=keep, traced_share=0.0, layout=renderer.layout)
+    torch.testing.assert_close(result.log_radiance, traced.log_radiance)
+    assert len(given) == 3
+    for patch, buffers, seen in zip(traced.log_radiance, traced.buffers, given, strict=True):
+        for image, shown in zip(
+            (patch.expm1(), *guides(buffers, renderer.layout)), seen, strict=True
+        ):
+            wanted = np.pad(image.numpy(), [(border, border)] * 2 + [(0, 0)], mode="reflect")
+            assert shown.is_contiguous()
+            torch.testing.assert_close(shown, torch.from_numpy(wanted))
 
 
 def test_of_a_denoised_patch_only_the_traced_share_is_noise() -> None:
