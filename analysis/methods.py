@@ -27,6 +27,7 @@ TITLES = {
     "ours_eager": "ours after what is rare, by predicted loss",
     "ours_predicted_from_buffers": "ours with patches chosen by their buffers",
     "ours_supersampled": "ours with supersampled edges",
+    "ours_small_patches": "ours with smaller patches of more configurations",
     "ours_exploring": "ours exploring, with Active Exploration's chains",
     "ours_loss_target": "ours exploring, with the loss alone as target",
     "ours_metropolis": "ours exploring, with Metropolis acceptance",

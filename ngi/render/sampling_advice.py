@@ -17,8 +17,8 @@ from ngi.scene.variable_scene import VariableScene
 SHINY = 0.1
 """Roughness (alpha) up to which a surface gathers light into caustics."""
 
-WORTH_A_LOOK = 200
-"""Samples per pixel from which on a patch's buffers cost next to nothing beside its paths."""
+WORTH_A_SETUP = 200
+"""Samples per pixel from which on a scene is set up in next to no time beside a patch's paths."""
 
 DEAR = 1000
 """Samples per pixel from which on the number of patches decides more than any choice of them."""
@@ -30,9 +30,8 @@ def sampling_advice(scene: VariableScene, materials: list[Material]) -> list[str
     """One line or more: the sampler, and the reason.
 
     Where the error is everywhere and patches are cheap, no choice is worth what it costs. What is
-    rare is one exception: what a light does that moves, goes out or is shut out, alone or through
-    what is smooth enough for caustics. Patches that take long to trace can be the other, where the
-    error is in few of them.
+    rare is an exception: what a light does that moves, goes out or is shut out, alone or through
+    what is smooth enough for caustics. Patches that take long to trace had better be small.
     """
     lines = ["sampler=sobol: the best known where the error is everywhere and patches are cheap"]
     if causes := _rare(scene, materials):
@@ -41,11 +40,10 @@ def sampling_advice(scene: VariableScene, materials: list[Material]) -> list[str
             f"the worst 5% of its patches: {'; '.join(causes)}"
         )
     spp = scene.description.samples_per_pixel
-    if spp >= WORTH_A_LOOK:
+    if spp >= WORTH_A_SETUP:
         lines.append(
-            f"method=ours_predicted_from_buffers is worth a try with the scene's {spp} samples per "
-            "pixel (budget=scarce): a few per cent less error, most of all in the worst pixels and "
-            "where the error is in few patches"
+            f"method=ours_small_patches with the scene's {spp} samples per pixel (budget=scarce): "
+            "as many paths on smaller patches of more v leave less error"
         )
     if spp >= DEAR:
         lines.append(

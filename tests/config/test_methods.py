@@ -25,7 +25,7 @@ IN_A_CLAIM = (
 """Ours without what a claim of the paper is about."""
 OURS = (
     *("ours", "ours_uniform", "ours_predicted", "ours_eager", "ours_predicted_from_buffers"),
-    "ours_supersampled",
+    *("ours_supersampled", "ours_small_patches"),
     *(*EXPLORING, *IN_A_CLAIM),
 )
 LIGHT = ["specular", "direct and caustics"]
@@ -54,6 +54,7 @@ METHODS = {  # sampler, resolution, model, what the renderer traces into the buf
         LIGHT,
     ),
     "ours_supersampled": ("sobol", "constant", "encoded_generator", LIGHT),
+    "ours_small_patches": ("sobol", "constant", "encoded_generator", LIGHT),
     **{
         method: (sampler, "constant", "encoded_generator", LIGHT)
         for method, sampler in EXPLORING.items()
@@ -142,6 +143,15 @@ def test_supersampled_edges_are_all_that_makes_ours_supersampled() -> None:
     assert finer.data == {**ours.data, "supersampled_edges": True}
     for part in set(ours) - {"data", "label", "hydra"}:
         assert finer[part] == ours[part], part
+
+
+def test_small_patches_are_as_many_pixels_of_more_scene_vectors() -> None:
+    ours, small = (composed("budget=small", f"method={m}") for m in ("ours", "ours_small_patches"))
+    assert small.sampler.chains == 4 * ours.sampler.chains
+    assert 2 * small.renderer.patch_size == ours.renderer.patch_size
+    small.sampler.chains, small.renderer.patch_size = ours.sampler.chains, ours.renderer.patch_size
+    for part in set(ours) - {"label", "hydra"}:
+        assert small[part] == ours[part], part
 
 
 def test_patches_are_the_cleaner_the_longer_a_budget_is() -> None:

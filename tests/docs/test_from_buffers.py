@@ -89,8 +89,13 @@ def test_what_was_tried_is_what_its_runs_say() -> None:
 
 def of_runs(budget: str) -> pd.DataFrame:
     """The last evaluation of each, by method, scene and seed."""
-    runs = pd.read_csv(FOLDER / "from_buffers.csv").query(f"budget == '{budget}'")
-    return runs.set_index(["method", "scene", "seed"]).sort_index().groupby(level=[0, 1, 2]).last()
+    return last_of(pd.read_csv(FOLDER / "from_buffers.csv").query(f"budget == '{budget}'"))
+
+
+def last_of(evaluations: pd.DataFrame) -> pd.DataFrame:
+    """Of each run, by method, scene and seed."""
+    by_run = evaluations.set_index(["method", "scene", "seed"]).sort_index()
+    return by_run.groupby(level=[0, 1, 2]).last()
 
 
 def errors_of(runs: pd.DataFrame) -> list[pd.Series]:

@@ -1,0 +1,99 @@
+"""The tables of docs/exploration-ceiling/small-patches.md are those of its runs."""
+
+import pandas as pd
+import pytest
+
+from tests.docs.test_ceiling_figures import rows_of, tenths
+from tests.docs.test_figures import geometric_mean, said
+from tests.docs.test_from_buffers import FOLDER, FRAMES, changes_of, last_of, mean_of
+
+PAGE = "docs/exploration-ceiling/small-patches.md"
+SMALL = "ours_small_patches"
+OTHERS = ("uniform_small_patches", "uniform_small_patches_of_8")
+SAME_MACHINE = {  # runs with patches of 32x32 on the machine that has those of 16x16
+    "living-room": "ours_predicted_from_buffers",
+    "sphere-caustic": "uniform_again",
+    "veach-egg": "sobol",
+}
+
+
+@pytest.fixture(scope="module")
+def runs() -> pd.DataFrame:
+    """With those of patches of 32x32; by method, scene and seed."""
+    files = (FOLDER / name for name in ("small_patches.csv", "from_buffers.csv"))
+    return last_of(pd.concat(map(pd.read_csv, files)).query("budget == 'scarce'"))
+
+
+def rows_of_runs(runs: pd.DataFrame) -> list[list[str]]:
+    """One for each scene, then one over the scenes."""
+    columns = changes_of(runs, SMALL, "ours_uniform")
+    own = runs.loc[SMALL]
+    base = runs.loc["ours_uniform"].loc[own.index]
+    assert (own.patches_traced == 4 * base.patches_traced).all()
+    rows = []
+    for scene in own.index.unique("scene"):
+        (steps,), (patches,) = own.loc[scene].step.unique(), own.loc[scene].patches_traced.unique()
+        errors = (geometric_mean(all_runs.loc[scene], "hard").mean() for all_runs in (base, own))
+        means = (mean_of(changes.loc[scene]) for changes in columns)
+        rows.append([f"{steps:,}", f"{patches:,}", *(f"{e:.4f}" for e in errors), *means])
+    over_scenes = (mean_of(changes.groupby("scene").mean()) for changes in columns)
+    return [*rows, ["", "", "", "", *over_scenes]]
+
+
+def rows_of_other_runs(runs: pd.DataFrame) -> list[list[str]]:
+    rows = []
+    for method in OTHERS:
+        columns = changes_of(runs, method, "ours_uniform")
+        rows += [
+            [mean_of(changes.loc[scene]) for changes in columns]
+            for scene in runs.loc[method].index.unique("scene")
+        ]
+    return rows
+
+
+def rows_of_small_runs(runs: pd.DataFrame) -> list[list[str]]:
+    """Of `budget=small`, after the same time: steps, and small patches in per cent of large."""
+    rows = []
+    for scene in runs.loc[SMALL].index.unique("scene"):
+        large, small = (runs.loc[method].loc[[(scene, 0)]] for method in ("ours", SMALL))
+        errors = [geometric_mean(small, f) / geometric_mean(large, f) - 1 for f in FRAMES]
+        steps = [f"{each.step.item()}" for each in (large, small)]
+        rows.append([*steps, *(tenths(error.item()) for error in errors)])
+    return rows
+
+
+def test_what_runs_end_with_is_what_their_table_says(runs: pd.DataFrame) -> None:
+    shown = [[cell.strip("*") for cell in row] for row in rows_of(PAGE, "In runs")]
+    assert shown[2:] == rows_of_runs(runs)
+
+
+def test_what_small_patches_alone_gain_is_what_their_runs_say(runs: pd.DataFrame) -> None:
+    assert rows_of(PAGE, "What of it is which")[2:] == rows_of_other_runs(runs)
+
+
+def test_what_small_patches_cost_where_samples_are_few_is_what_their_runs_say() -> None:
+    evaluations = pd.read_csv(FOLDER / "small_patches.csv").query("budget == 'small'")
+    shown = rows_of(PAGE, "What more scene vectors cost")[2:]
+    assert shown == rows_of_small_runs(last_of(evaluations))
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/guide/sampler.md", PAGE])
+def test_what_is_said_of_all_runs_is_the_last_row(page: str, runs: pd.DataFrame) -> None:
+    shown = said(
+        page,
+        r"(\d+\.\d) % ± (\d+\.\d)(?:\]\([^)]+\))? less error on hard frames and "
+        r"(\d+\.\d) % ± (\d+\.\d) on uniform ones",
+    )
+    row = rows_of_runs(runs)[-1]
+    expected = [row[column].lstrip("−").split(" (")[0].split(" ± ") for column in (4, 6)]
+    assert [*shown] == [*expected[0], *expected[1]]
+
+
+def test_what_more_scene_vectors_cost_is_what_runs_on_one_machine_took(runs: pd.DataFrame) -> None:
+    ratios = {
+        scene: runs.run_seconds["uniform_small_patches", scene, 0]
+        / runs.run_seconds[method, scene, 0]
+        for scene, method in SAME_MACHINE.items()
+    }
+    shown = said(PAGE, r"took (\d+) % longer on living-room, (\d+) % on sphere-caustic and (\d+) %")
+    assert [*shown] == [f"{100 * (ratios[scene] - 1):.0f}" for scene in SAME_MACHINE]
