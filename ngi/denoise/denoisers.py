@@ -100,7 +100,7 @@ def guides(buffers: Tensor, layout: BufferLayout) -> tuple[Tensor, Tensor]:
 def denoised(
     traced: RenderedPatches, *, denoiser: Denoiser, traced_share: float, layout: BufferLayout
 ) -> RenderedPatches:
-    """The patches, denoised one by one, on the CPU.
+    """The patches, denoised one by one, each with `BORDER` pixels around it, on the CPU.
 
     A denoiser errs in the same way wherever the same detail is seen, so that a network would learn
     its errors. Noise differs from patch to patch, and a network averages over it.
