@@ -57,7 +57,10 @@ class JitTracer(Tracer):
         self._light = None if caustics is None else _PhotonLight(scene, caustics, changes, recorded)
         self._points: dict[int, tuple[mi.Point2f, list[mi.Float]]] = {}
         # Plain functions, not methods: a frozen function follows the arrays of its arguments only,
-        # and holds what is constant for this tracer in its closure.
+        # and holds what is constant for this tracer in its closure. At every call Dr.Jit walks
+        # through the closure, too, where that holds dataclasses (of living-room's materials half of
+        # the call), but not through a function's own.
+        channels = _hidden(first_hit.channels)
         integrator = scene.integrator()
         sampler = mi.load_dict({"type": "independent"})
 
@@ -88,7 +91,7 @@ class JitTracer(Tracer):
             jitter = dr.gather(mi.Point2f, points, sample)
             light_point = [dr.gather(mi.Float, each, sample) for each in light_points]
             ray = view.rays(scene, pixel, jitter)
-            return _block_sums(first_hit.channels(scene, ray, light_point, *light), samples)
+            return _block_sums(channels(scene, ray, light_point, *light), samples)
 
         self._radiance = _replayed(trace_radiance, recorded=recorded)
         self._buffers = _replayed(trace_buffers, recorded=recorded)
@@ -144,8 +147,10 @@ class _PhotonLight:
     def __init__(
         self, scene: mi.Scene, caustics: Caustics, changes: Callable[[], int], recorded: bool
     ) -> None:
+        trace = _hidden(caustics.trace)
+
         def trace_photons(scene: mi.Scene, photons: list[mi.Float]) -> list[mi.Float]:
-            light = caustics.trace(scene, photons)
+            light = trace(scene, photons)
             dr.eval(light)
             return [light]
 
@@ -163,6 +168,11 @@ class _PhotonLight:
             self._light = self._trace(self._scene, self._photons)
             self._light_of = changes
         return self._light
+
+
+def _hidden(method: Callable[..., Any]) -> Callable[..., Any]:
+    """A function that calls the method, whose object Dr.Jit does not see."""
+    return lambda *arguments: method(*arguments)
 
 
 def _points(samples: int) -> tuple[mi.Point2f, list[mi.Float]]:

@@ -1,7 +1,11 @@
 """Kernels that Dr.Jit records, and scenes of which it cannot."""
 
+import dataclasses
 import gc
 import logging
+import sys
+from collections import Counter
+from types import FrameType
 
 import numpy as np
 import pytest
@@ -103,3 +107,20 @@ def test_what_cannot_be_recorded_is_traced_each_time(
     assert caplog.messages == [said, said], "once for the radiance, once for the buffers"
     assert torch.equal(patches.log_radiance, expected.log_radiance)
     assert torch.equal(patches.buffers, expected.buffers)
+
+
+def test_a_replay_does_not_walk_through_the_materials(renderer_of_a_screen) -> None:
+    renderer = renderer_of_a_screen()
+    renderer.render_patches(STATES, resolution=8, seed=0)
+    walked = Counter()
+
+    def count(frame: FrameType, event: str, _argument: object) -> None:
+        if event == "call" and frame.f_code is dataclasses.fields.__code__:
+            walked[frame.f_locals["class_or_instance"].__name__] += 1
+
+    sys.setprofile(count)
+    try:
+        renderer.render_patches(STATES, resolution=8, seed=1)
+    finally:
+        sys.setprofile(None)
+    assert walked.keys() == {"_View"}
