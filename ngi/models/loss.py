@@ -26,7 +26,8 @@ class L1Dssim:
 
     SSIM is that of Wang et al. 2004: Gaussian window, weighted (not sample) covariances, each
     channel by itself, averaged over the windows that lie in the patch. It is computed in float32
-    (float64 for float64 input), under autocast too.
+    (float64 for float64 input), under autocast too. Of 32x32 pixels 22x22 are the middle of such a
+    window, of 16x16 6x6; ours takes those of all pixels.
 
     l1_weight, dssim_weight: the release has 2·L1 + (1 − SSIM), which is 2 and 2 here
     window_size: pixels along the window's side, odd
@@ -35,6 +36,7 @@ class L1Dssim:
     data_range: L, the range of the values, in log1p radiance; the release takes 1
     relative_weight: 0 in the paper
     relative_offset: in radiance; what is far below it counts by its absolute error again
+    mirrored: continue the patch by its mirror image, so that every pixel is a window's middle
     release_layout: read the patch as the release does, which takes its [n, P, P, 3] for channels
         first: the window then spans columns and colours of one row of pixels, zeros around them.
         It makes the term 4 to 5 times weaker
@@ -49,6 +51,7 @@ class L1Dssim:
     data_range: float = 1.0
     relative_weight: float = 0.0
     relative_offset: float = 0.03
+    mirrored: bool = False
     release_layout: bool = False
 
     def __post_init__(self) -> None:
@@ -118,7 +121,7 @@ class L1Dssim:
         return similarity
 
     def _filter(self, images: Tensor) -> Tensor:
-        """Weighted means over every window that lies within the last two dimensions.
+        """Weighted means over every window of the last two dimensions.
 
         The window is separable: two products with banded matrices, which for patches of this
         size take less time than convolutions.
@@ -127,9 +130,17 @@ class L1Dssim:
         return rows @ images @ columns.T
 
     def _band_matrix(self, size: int, like: Tensor) -> Tensor:
-        """[size − window_size + 1, size]: row i holds the normalised window that starts at i."""
+        """[size − window_size + 1, size]: row i holds the normalised window that starts at i.
+
+        [size, size] where the image is continued by its mirror image: row i has its middle at i.
+        """
         radius = self.window_size // 2
-        centre = torch.arange(radius, size - radius, device=like.device, dtype=like.dtype)
-        distance = torch.arange(size, device=like.device, dtype=like.dtype) - centre[:, None]
+        outside = radius if self.mirrored else 0
+        pixels = torch.arange(-outside, size + outside, device=like.device, dtype=like.dtype)
+        centre = pixels[radius : len(pixels) - radius]
+        distance = pixels - centre[:, None]
         weight = torch.exp(-0.5 * (distance / self.sigma) ** 2) * (distance.abs() <= radius)
-        return weight / weight.sum(dim=1, keepdim=True)
+        before, inside, after = weight.split([outside, size, outside], dim=1)
+        inside[:, :outside] += before.flip(1)
+        inside[:, size - outside :] += after.flip(1)
+        return inside / inside.sum(dim=1, keepdim=True)

@@ -41,6 +41,26 @@ def test_dssim_is_scikit_images(size, data_range) -> None:
     torch.testing.assert_close(ssim.double(), torch.tensor(expected), rtol=1e-5, atol=1e-5)
 
 
+@pytest.mark.parametrize("size", [(32, 32), (16, 16), (11, 20)])
+def test_mirrored_dssim_is_that_of_scikit_images_whole_map(size) -> None:
+    prediction, target = images(4, *size, 3)
+    expected = [
+        structural_similarity(
+            p.numpy(),
+            t.numpy(),
+            channel_axis=-1,
+            gaussian_weights=True,
+            use_sample_covariance=False,
+            data_range=1,
+            full=True,
+        )[1].mean()
+        for p, t in zip(prediction, target, strict=True)
+    ]
+    loss = L1Dssim(l1_weight=0, dssim_weight=1, mirrored=True)
+    ssim = 1 - 2 * loss(prediction, target)
+    torch.testing.assert_close(ssim, torch.tensor(expected), rtol=1e-10, atol=1e-12)
+
+
 def test_terms_are_weighted_and_samples_kept_apart() -> None:
     prediction, target = images(3, 16, 16, 3)
     l1 = (prediction - target).abs().mean(dim=(1, 2, 3))
