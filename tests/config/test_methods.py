@@ -54,7 +54,7 @@ METHODS = {  # sampler, resolution, model, what the renderer traces into the buf
         LIGHT,
     ),
     "ours_supersampled": ("sobol", "constant", "encoded_generator", LIGHT),
-    "ours_small_patches": ("sobol", "constant", "encoded_generator", LIGHT),
+    "ours_small_patches": ("predicted_from_buffers", "constant", "encoded_generator", LIGHT),
     **{
         method: (sampler, "constant", "encoded_generator", LIGHT)
         for method, sampler in EXPLORING.items()
@@ -146,12 +146,18 @@ def test_supersampled_edges_are_all_that_makes_ours_supersampled() -> None:
 
 
 def test_small_patches_are_as_many_pixels_of_more_scene_vectors() -> None:
-    ours, small = (composed("budget=small", f"method={m}") for m in ("ours", "ours_small_patches"))
-    assert small.sampler.chains == 4 * ours.sampler.chains
-    assert 2 * small.renderer.patch_size == ours.renderer.patch_size
-    small.sampler.chains, small.renderer.patch_size = ours.sampler.chains, ours.renderer.patch_size
-    for part in set(ours) - {"label", "hydra"}:
-        assert small[part] == ours[part], part
+    methods = ("ours_predicted_from_buffers", "ours_small_patches")
+    large, small = (composed("budget=small", f"method={method}") for method in methods)
+    assert 2 * small.renderer.patch_size == large.renderer.patch_size
+    for of_batch in ("chains", "uniform_first"):
+        assert small.sampler[of_batch] == 4 * large.sampler[of_batch]
+        small.sampler[of_batch] = large.sampler[of_batch]
+    assert small.sampler.candidates == 4 * 32, "of every scene vector one patch is traced"
+    small.sampler.candidates = large.sampler.candidates
+    small.renderer.patch_size = large.renderer.patch_size
+    assert small.loss == {**large.loss, "mirrored": True}
+    for part in set(large) - {"label", "hydra", "loss"}:
+        assert small[part] == large[part], part
 
 
 def test_patches_are_the_cleaner_the_longer_a_budget_is() -> None:

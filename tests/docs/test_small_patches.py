@@ -10,7 +10,11 @@ from tests.docs.test_from_buffers import FOLDER, FRAMES, changes_of, last_of, le
 
 PAGE = "docs/exploration-ceiling/small-patches.md"
 SMALL = "ours_small_patches"
-OTHERS = ("uniform_small_patches", "uniform_small_patches_of_8")
+SOBOL = "sobol_small_patches"
+OTHERS = (
+    *("uniform_small_patches", "uniform_small_patches_of_8", SOBOL),
+    *("sobol_small_patches_mirrored", "looked_at_48"),
+)
 SAME_MACHINE = {  # runs with patches of 32x32 on the machine that has those of 16x16
     "living-room": "ours_predicted_from_buffers",
     "sphere-caustic": "uniform_again",
@@ -33,30 +37,37 @@ def rows_of_runs(runs: pd.DataFrame) -> list[list[str]]:
     assert (own.patches_traced == 4 * base.patches_traced).all()
     rows = []
     for scene in own.index.unique("scene"):
-        (steps,), (patches,) = own.loc[scene].step.unique(), own.loc[scene].patches_traced.unique()
+        here = own.loc[scene]
+        (steps,), (patches,) = here.step.unique(), here.patches_traced.unique()
         errors = (geometric_mean(all_runs.loc[scene], "hard").mean() for all_runs in (base, own))
         means = (mean_of(changes.loc[scene]) for changes in columns)
-        rows.append([f"{steps:,}", f"{patches:,}", *(f"{e:.4f}" for e in errors), *means])
-    over_scenes = (mean_of(changes.groupby("scene").mean()) for changes in columns)
-    return [*rows, ["", "", "", "", *over_scenes]]
+        looking = f"{100 * here.explore_seconds.sum() / here.run_seconds.sum():.1f}"
+        rows.append([f"{steps:,}", f"{patches:,}", *(f"{e:.4f}" for e in errors), *means, looking])
+    return [*rows, ["", "", "", "", *over_scenes(columns), ""]]
+
+
+def over_scenes(columns: list[pd.Series]) -> list[str]:
+    """The mean over scenes of each, of its pairs."""
+    return [mean_of(changes.groupby("scene").mean()) for changes in columns]
 
 
 def rows_of_other_runs(runs: pd.DataFrame) -> list[list[str]]:
+    """Of each kind one for each scene; one over the scenes where there are all."""
     rows = []
     for method in OTHERS:
         columns = changes_of(runs, method, "ours_uniform")
-        rows += [
-            [mean_of(changes.loc[scene]) for changes in columns]
-            for scene in runs.loc[method].index.unique("scene")
-        ]
+        scenes = runs.loc[method].index.unique("scene")
+        rows += [[mean_of(changes.loc[scene]) for changes in columns] for scene in scenes]
+        if method == SOBOL:
+            rows.append(over_scenes(columns))
     return rows
 
 
 def rows_of_small_runs(runs: pd.DataFrame) -> list[list[str]]:
     """Of `budget=small`, after the same time: steps, and small patches in per cent of large."""
     rows = []
-    for scene in runs.loc[SMALL].index.unique("scene"):
-        large, small = (runs.loc[method].loc[[(scene, 0)]] for method in ("ours", SMALL))
+    for scene in runs.loc[SOBOL].index.unique("scene"):
+        large, small = (runs.loc[method].loc[[(scene, 0)]] for method in ("ours", SOBOL))
         errors = [geometric_mean(small, f) / geometric_mean(large, f) - 1 for f in FRAMES]
         steps = [f"{each.step.item()}" for each in (large, small)]
         rows.append([*steps, *(tenths(error.item()) for error in errors)])
@@ -69,7 +80,8 @@ def test_what_runs_end_with_is_what_their_table_says(runs: pd.DataFrame) -> None
 
 
 def test_what_small_patches_alone_gain_is_what_their_runs_say(runs: pd.DataFrame) -> None:
-    assert rows_of(PAGE, "What of it is which")[2:] == rows_of_other_runs(runs)
+    shown = [[cell.strip("*") for cell in row] for row in rows_of(PAGE, "What of it is which")]
+    assert shown[2:] == rows_of_other_runs(runs)
 
 
 def test_what_small_patches_cost_where_samples_are_few_is_what_their_runs_say() -> None:
@@ -80,13 +92,22 @@ def test_what_small_patches_cost_where_samples_are_few_is_what_their_runs_say() 
 
 @pytest.mark.parametrize("page", ["README.md", "docs/guide/sampler.md", PAGE])
 def test_what_is_said_of_all_runs_is_the_last_row(page: str, runs: pd.DataFrame) -> None:
+    less_than = r"(\d+\.\d) % ± (\d+\.\d)"
     shown = said(
         page,
-        r"(\d+\.\d) % ± (\d+\.\d)(?:\]\([^)]+\))? less error on hard frames and "
-        r"(\d+\.\d) % ± (\d+\.\d) on uniform ones",
+        rf"{less_than}(?:\]\([^)]+\))? less error on hard frames and {less_than} on uniform ones, "
+        rf"{less_than} and {less_than} less on the worst 5 % of pixels",
     )
-    row = rows_of_runs(runs)[-1]
-    assert [*shown] == less([row[4], row[6]])
+    hard, hard_tail, uniform, uniform_tail = rows_of_runs(runs)[-1][4:8]
+    assert [*shown] == less([hard, uniform, hard_tail, uniform_tail])
+
+
+def test_what_looking_and_whole_windows_add_is_what_the_runs_that_both_have_say(
+    runs: pd.DataFrame,
+) -> None:
+    (shown,) = said(PAGE, r"Against the sequence alone they have (.+?) \(the mean over")
+    cells = over_scenes(changes_of(runs, SMALL, SOBOL))
+    assert shown == ", ".join(cell.split(" (")[0].replace(" ±", " % ±") for cell in cells)
 
 
 def test_what_a_choice_of_large_patches_gains_is_what_its_page_says() -> None:
