@@ -27,7 +27,7 @@ class L1Dssim:
     SSIM is that of Wang et al. 2004: Gaussian window, weighted (not sample) covariances, each
     channel by itself, averaged over the windows that lie in the patch. It is computed in float32
     (float64 for float64 input), under autocast too. Of 32x32 pixels 22x22 are the middle of such a
-    window, of 16x16 6x6; ours takes those of all pixels.
+    window, of 16x16 6x6; where `mirrored` all are.
 
     l1_weight, dssim_weight: the release has 2·L1 + (1 − SSIM), which is 2 and 2 here
     window_size: pixels along the window's side, odd
@@ -62,6 +62,11 @@ class L1Dssim:
             raise ValueError("all weights of the loss are 0 (loss.l1_weight): nothing is learned")
         if self.window_size < 1 or self.window_size % 2 == 0:
             raise ValueError(f"loss.window_size is {self.window_size}: it must be odd and positive")
+        if self.mirrored and self.release_layout:
+            raise ValueError(
+                "loss.mirrored: true: the release has zeros around a patch (loss.release_layout: "
+                "true); choose one of both"
+            )
         for name in ("sigma", "k1", "k2", "data_range", "relative_offset"):
             if getattr(self, name) <= 0:
                 raise ValueError(f"loss.{name} is {getattr(self, name)}: it must be above 0")
