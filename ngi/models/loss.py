@@ -148,4 +148,5 @@ class L1Dssim:
         before, inside, after = weight.split([outside, size, outside], dim=1)
         inside[:, :outside] += before.flip(1)
         inside[:, size - outside :] += after.flip(1)
-        return inside / inside.sum(dim=1, keepdim=True)
+        normalised: Tensor = inside / inside.sum(dim=1, keepdim=True)
+        return normalised
