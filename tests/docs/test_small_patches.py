@@ -11,8 +11,9 @@ from tests.docs.test_from_buffers import FOLDER, FRAMES, changes_of, last_of, le
 PAGE = "docs/exploration-ceiling/small-patches.md"
 SMALL = "ours_small_patches"
 SOBOL = "sobol_small_patches"
+WHOLE = "uniform_seen_whole"  # patches of 32x32; the denoiser's border, all of SSIM's windows
 OTHERS = (
-    *("uniform_small_patches", "uniform_small_patches_of_8", SOBOL),
+    *(WHOLE, "uniform_small_patches", "uniform_small_patches_of_8", SOBOL),
     *("sobol_small_patches_mirrored", "looked_at_48"),
 )
 SAME_MACHINE = {  # runs with patches of 32x32 on the machine that has those of 16x16
@@ -108,6 +109,13 @@ def test_what_looking_and_whole_windows_add_is_what_the_runs_that_both_have_say(
     (shown,) = said(PAGE, r"Against the sequence alone they have (.+?) \(the mean over")
     cells = over_scenes(changes_of(runs, SMALL, SOBOL))
     assert shown == ", ".join(cell.split(" (")[0].replace(" ±", " % ±") for cell in cells)
+
+
+def test_what_is_left_against_uniform_sampling_that_sees_patches_whole(runs: pd.DataFrame) -> None:
+    scene, seed = "sphere-caustic", 0
+    hard = geometric_mean(runs, "hard")
+    left = hard[SMALL, scene, seed] / hard[WHOLE, scene, seed] - 1
+    assert said(PAGE, r"has both, small patches have (\S+) % on sphere-caustic")[0] == tenths(left)
 
 
 def test_what_a_choice_of_large_patches_gains_is_what_its_page_says() -> None:
