@@ -57,11 +57,8 @@ class JitTracer(Tracer):
         self._light = None if caustics is None else _PhotonLight(scene, caustics, changes, recorded)
         self._points: dict[int, tuple[mi.Point2f, list[mi.Float]]] = {}
         # Plain functions, not methods: a frozen function follows the arrays of its arguments only,
-        # and holds what is constant for this tracer in its closure. At every call Dr.Jit walks
-        # through the closure, too, where that holds dataclasses (of living-room's materials half of
-        # the call), but not through a function's own.
-        channels = _hidden(first_hit.channels)
-        integrator = scene.integrator()
+        # and holds what is constant for this tracer in its closure.
+        integrator, channels = scene.integrator(), _hidden(first_hit.channels)
         sampler = mi.load_dict({"type": "independent"})
 
         def trace_radiance(
@@ -171,7 +168,11 @@ class _PhotonLight:
 
 
 def _hidden(method: Callable[..., Any]) -> Callable[..., Any]:
-    """A function that calls the method, whose object Dr.Jit does not see."""
+    """A function that calls the method, whose object Dr.Jit does not see.
+
+    At every call it walks through what a frozen function's closure holds, dataclasses in Python:
+    the materials of living-room were half of it. Through a function's own closure it does not.
+    """
     return lambda *arguments: method(*arguments)
 
 
