@@ -103,6 +103,13 @@ def test_what_is_said_of_all_runs_is_the_last_row(page: str, runs: pd.DataFrame)
     assert [*shown] == less([hard, uniform, hard_tail, uniform_tail])
 
 
+def test_each_scene_has_less_of_each_error(runs: pd.DataFrame) -> None:
+    (word,) = said(PAGE, r"the mean over (\w+) scenes\. Each scene has less of each of the four")
+    changes = pd.concat(changes_of(runs, SMALL, "ours_uniform"), axis=1)
+    assert (changes < 0).all(axis=None)
+    assert (word, len(changes.index.unique("scene"))) == ("seven", 7)
+
+
 def test_what_looking_and_whole_windows_add_is_what_the_runs_that_both_have_say(
     runs: pd.DataFrame,
 ) -> None:
