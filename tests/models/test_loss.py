@@ -18,22 +18,27 @@ def images(*shape: int, seed: int = 0, dtype: torch.dtype = torch.float64):
     return (target + 0.2 * noise).to(dtype), target.to(dtype)
 
 
-@pytest.mark.parametrize("size", [(32, 32), (11, 11), (33, 20)])
-@pytest.mark.parametrize("data_range", [1.0, 2.5])
-def test_dssim_is_scikit_images(size, data_range) -> None:
-    prediction, target = images(4, *size, 3)
-    assert (prediction < 0).any()
-    expected = [
+def scikit_images(prediction: torch.Tensor, target: torch.Tensor, **options) -> list:
+    """What `structural_similarity` gives for each image."""
+    return [
         structural_similarity(
             p.numpy(),
             t.numpy(),
             channel_axis=-1,
             gaussian_weights=True,
             use_sample_covariance=False,
-            data_range=data_range,
+            **options,
         )
         for p, t in zip(prediction, target, strict=True)
     ]
+
+
+@pytest.mark.parametrize("size", [(32, 32), (11, 11), (33, 20)])
+@pytest.mark.parametrize("data_range", [1.0, 2.5])
+def test_dssim_is_scikit_images(size, data_range) -> None:
+    prediction, target = images(4, *size, 3)
+    assert (prediction < 0).any()
+    expected = scikit_images(prediction, target, data_range=data_range)
     loss = L1Dssim(l1_weight=0, dssim_weight=1, data_range=data_range)
     ssim = 1 - 2 * loss(prediction, target)
     torch.testing.assert_close(ssim, torch.tensor(expected), rtol=1e-10, atol=1e-12)
@@ -44,18 +49,8 @@ def test_dssim_is_scikit_images(size, data_range) -> None:
 @pytest.mark.parametrize("size", [(32, 32), (16, 16), (11, 20)])
 def test_mirrored_dssim_is_that_of_scikit_images_whole_map(size) -> None:
     prediction, target = images(4, *size, 3)
-    expected = [
-        structural_similarity(
-            p.numpy(),
-            t.numpy(),
-            channel_axis=-1,
-            gaussian_weights=True,
-            use_sample_covariance=False,
-            data_range=1,
-            full=True,
-        )[1].mean()
-        for p, t in zip(prediction, target, strict=True)
-    ]
+    maps = scikit_images(prediction, target, data_range=1, full=True)
+    expected = [similarity.mean() for _, similarity in maps]
     loss = L1Dssim(l1_weight=0, dssim_weight=1, mirrored=True)
     ssim = 1 - 2 * loss(prediction, target)
     torch.testing.assert_close(ssim, torch.tensor(expected), rtol=1e-10, atol=1e-12)
