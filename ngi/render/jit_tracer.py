@@ -58,7 +58,7 @@ class JitTracer(Tracer):
         self._points: dict[int, tuple[mi.Point2f, list[mi.Float]]] = {}
         # Plain functions, not methods: a frozen function follows the arrays of its arguments only,
         # and holds what is constant for this tracer in its closure.
-        integrator, channels = scene.integrator(), _hidden(first_hit.channels)
+        integrator = scene.integrator()
         sampler = mi.load_dict({"type": "independent"})
 
         def trace_radiance(
@@ -88,7 +88,7 @@ class JitTracer(Tracer):
             jitter = dr.gather(mi.Point2f, points, sample)
             light_point = [dr.gather(mi.Float, each, sample) for each in light_points]
             ray = view.rays(scene, pixel, jitter)
-            return _block_sums(channels(scene, ray, light_point, *light), samples)
+            return _block_sums(first_hit.channels(scene, ray, light_point, *light), samples)
 
         self._radiance = _replayed(trace_radiance, recorded=recorded)
         self._buffers = _replayed(trace_buffers, recorded=recorded)
@@ -144,10 +144,8 @@ class _PhotonLight:
     def __init__(
         self, scene: mi.Scene, caustics: Caustics, changes: Callable[[], int], recorded: bool
     ) -> None:
-        trace = _hidden(caustics.trace)
-
         def trace_photons(scene: mi.Scene, photons: list[mi.Float]) -> list[mi.Float]:
-            light = trace(scene, photons)
+            light = caustics.trace(scene, photons)
             dr.eval(light)
             return [light]
 
@@ -165,15 +163,6 @@ class _PhotonLight:
             self._light = self._trace(self._scene, self._photons)
             self._light_of = changes
         return self._light
-
-
-def _hidden(method: Callable[..., Any]) -> Callable[..., Any]:
-    """A function that calls the method, whose object Dr.Jit does not see.
-
-    At every call it walks through what a frozen function's closure holds, dataclasses in Python:
-    the materials of living-room were half of it. Through a function's own closure it does not.
-    """
-    return lambda *arguments: method(*arguments)
 
 
 def _points(samples: int) -> tuple[mi.Point2f, list[mi.Float]]:
@@ -195,8 +184,11 @@ def _replayed(function: Trace, *, recorded: bool) -> Trace:
     """
     if not recorded:
         return function
+    # At every call Dr.Jit walks through what a frozen function's closure holds, dataclasses in
+    # Python: the materials of living-room were half of it. What `function` holds it does not see.
     # A variable material makes a recording for every combination of the choices.
-    replayed, works = dr.freeze(function, warn_after=RECORDINGS), True
+    replayed = dr.freeze(lambda *arguments: function(*arguments), warn_after=RECORDINGS)
+    works = True
 
     def trace(*arguments: Any) -> list[mi.Float]:
         nonlocal works
