@@ -135,6 +135,11 @@ def less(cells: list[str]) -> list[str]:
     return [number for cell in cells for number in cell.lstrip("−").split(" (")[0].split(" ± ")]
 
 
+def over_scenes(columns: list[pd.Series]) -> list[str]:
+    """The mean over scenes of each, of its pairs."""
+    return [mean_of(changes.groupby("scene").mean()) for changes in columns]
+
+
 def rows_of_runs(runs: pd.DataFrame) -> list[list[str]]:
     """One for each scene, then one over the scenes."""
     columns = changes_of(runs, LOOKING, "ours_uniform")
@@ -149,8 +154,7 @@ def rows_of_runs(runs: pd.DataFrame) -> list[list[str]]:
         share = 100 * here.explore_seconds.sum() / here.run_seconds.sum()
         means = [mean_of(changes.loc[scene]) for changes in columns]
         rows.append([f"{steps:,}", f"{patches}", f"{error:.4f}", *means, f"{share:.1f}"])
-    over_scenes = [mean_of(changes.groupby("scene").mean()) for changes in columns]
-    return [*rows, ["", "", "", *over_scenes, ""]]
+    return [*rows, ["", "", "", *over_scenes(columns), ""]]
 
 
 def rows_of_other_runs(runs: pd.DataFrame) -> list[list[str]]:

@@ -6,7 +6,16 @@ import pytest
 from tests.docs import test_from_buffers as from_buffers
 from tests.docs.test_ceiling_figures import rows_of, tenths
 from tests.docs.test_figures import geometric_mean, said
-from tests.docs.test_from_buffers import FOLDER, FRAMES, changes_of, last_of, less, mean_of
+from tests.docs.test_from_buffers import (
+    FOLDER,
+    FRAMES,
+    changes_of,
+    last_of,
+    less,
+    mean_of,
+    over_scenes,
+    percent,
+)
 
 PAGE = "docs/exploration-ceiling/small-patches.md"
 SMALL = "ours_small_patches"
@@ -45,11 +54,6 @@ def rows_of_runs(runs: pd.DataFrame) -> list[list[str]]:
         looking = f"{100 * here.explore_seconds.sum() / here.run_seconds.sum():.1f}"
         rows.append([f"{steps:,}", f"{patches:,}", *(f"{e:.4f}" for e in errors), *means, looking])
     return [*rows, ["", "", "", "", *over_scenes(columns), ""]]
-
-
-def over_scenes(columns: list[pd.Series]) -> list[str]:
-    """The mean over scenes of each, of its pairs."""
-    return [mean_of(changes.groupby("scene").mean()) for changes in columns]
 
 
 def rows_of_other_runs(runs: pd.DataFrame) -> list[list[str]]:
@@ -114,8 +118,8 @@ def test_what_looking_and_whole_windows_add_is_what_the_runs_that_both_have_say(
     runs: pd.DataFrame,
 ) -> None:
     (shown,) = said(PAGE, r"Against the sequence alone they have (.+?) \(the mean over")
-    cells = over_scenes(changes_of(runs, SMALL, SOBOL))
-    assert shown == ", ".join(cell.split(" (")[0].replace(" ±", " % ±") for cell in cells)
+    added = (changes.groupby("scene").mean() for changes in changes_of(runs, SMALL, SOBOL))
+    assert shown == ", ".join(map(percent, added))
 
 
 def test_what_is_left_against_uniform_sampling_that_sees_patches_whole(runs: pd.DataFrame) -> None:
