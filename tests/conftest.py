@@ -1,7 +1,8 @@
 import gc
 
-from tests import quick_hydra, quick_kernels
+from tests import quick_files, quick_hydra, quick_kernels
 
+quick_files.use()
 quick_hydra.use()
 quick_kernels.use()
 

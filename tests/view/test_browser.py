@@ -101,9 +101,10 @@ def browser(started: playwright.Browser) -> Iterator[playwright.Browser]:
 
 def opened(browser: playwright.Browser, address: str) -> playwright.Page:
     page = browser.new_page(viewport={"width": 1000, "height": 600}, accept_downloads=True)
+    page.set_default_timeout(PATIENCE)
     page.add_init_script(DRAW_SELDOM)
-    page.goto(address, timeout=PATIENCE)
-    page.get_by_text("64 × 64 pixels").wait_for(timeout=PATIENCE)
+    page.goto(address)
+    page.get_by_text("64 × 64 pixels").wait_for()
     return page
 
 
@@ -246,7 +247,7 @@ def test_two_browsers_and_a_configuration_that_is_saved_and_loaded(
                 files=[{"name": "v.json", "mimeType": "application/json", "buffer": content}]
             )
             if not accepted:
-                theirs.get_by_text("3 numbers from 0 to 1").wait_for(timeout=PATIENCE)
+                theirs.get_by_text("3 numbers from 0 to 1").wait_for()
         np.testing.assert_array_equal(wait_until_changed(theirs, start), changed)
 
 
