@@ -43,7 +43,8 @@ def sampling_advice(scene: VariableScene, materials: list[Material]) -> list[str
     if spp >= WORTH_A_SETUP:
         lines.append(
             f"method=ours_small_patches with the scene's {spp} samples per pixel (budget=scarce): "
-            "as many paths on smaller patches of more v leave less error"
+            "as many paths on smaller patches of more v, each at the best of four places, have "
+            "less error"
         )
     if spp >= DEAR:
         lines.append(
