@@ -18,7 +18,7 @@ from ngi.explore.proposals import (
 )
 from ngi.explore.resolution import GrowingResolution, ResolutionSchedule
 from ngi.explore.sampler import Sampler
-from ngi.explore.space_filling import LatinHypercube, Sobol
+from ngi.explore.space_filling import LatinHypercube, Sobol, SobolQuarters
 from ngi.explore.targets import Constant as ConstantTarget
 from ngi.explore.targets import Loss, LossTimesOutputGradient, LossTimesStep, Signals, Target
 
@@ -48,6 +48,7 @@ __all__ = [
     "Sampler",
     "Signals",
     "Sobol",
+    "SobolQuarters",
     "Target",
     "nothing_known",
 ]

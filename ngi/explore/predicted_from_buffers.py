@@ -10,10 +10,7 @@ from ngi.explore.forest import Forest
 from ngi.explore.importance import Importance
 from ngi.explore.predicted import PredictedLoss, PredictedState
 from ngi.explore.proposals import Describe
-from ngi.explore.space_filling import SobolSequence
-
-QUARTERS = torch.tensor([[0.0, 0.0], [0.5, 0.0], [0.0, 0.5], [0.5, 0.5]])
-"""Patch positions of candidates with one v, from that of the first on; beyond 1 they begin at 0."""
+from ngi.explore.space_filling import QUARTERS, SobolSequence
 
 
 def worth(known: Tensor, forest: Forest) -> Tensor:
@@ -91,22 +88,20 @@ class PredictedFromBuffers(PredictedLoss):
         generator: torch.Generator,
     ) -> tuple[Tensor, Tensor, Tensor]:
         """One of each group, after those that are taken as they come."""
+        earlier, dimensions = self._points_before(batch), state.position.shape[1]
         if len(state.seen) < self._grown_from:
-            first = self._points(state, batch, self.chains)
+            first = self._sequence.points(earlier, self.chains, dimensions)
             return first, describe(first), torch.ones(self.chains)
-        points = self._points(state, batch, self._vectors)
-        candidates = points.repeat_interleave(len(QUARTERS), dim=0)
-        candidates[:, -2:] = (candidates[:, -2:] + QUARTERS.repeat(len(points), 1)) % 1
+        candidates = self._sequence.quarters(earlier, self._vectors, dimensions)
         known = describe(candidates)
         values = worth(known, state.forest)
         best = self._one_of_each(values.view(-1, len(QUARTERS)), generator)
         return candidates[best], known[best], values[best]
 
-    def _points(self, state: PredictedState, batch: int, count: int) -> Tensor:
-        """[count, S] of the sequence: those after what earlier batches had."""
+    def _points_before(self, batch: int) -> int:
+        """How many of the sequence earlier batches had."""
         looked_at = max(0, batch - math.ceil(self._grown_from / self.chains))
-        first = (batch - looked_at) * self.chains + looked_at * self._vectors
-        return self._sequence.points(first, count, state.position.shape[1])
+        return (batch - looked_at) * self.chains + looked_at * self._vectors
 
     def _one_of_each(self, values: Tensor, generator: torch.Generator) -> Tensor:
         """[g] candidates, one of each group, drawn by their values [g, k]."""

@@ -7,7 +7,14 @@ from scipy import stats
 from scipy.stats import qmc
 from torch.quasirandom import SobolEngine
 
-from ngi.explore import Always, ConstantTarget, LatinHypercube, MarkovChains, Sobol
+from ngi.explore import (
+    Always,
+    ConstantTarget,
+    LatinHypercube,
+    MarkovChains,
+    Sobol,
+    SobolQuarters,
+)
 
 CHAINS = (16, 12)
 
@@ -150,3 +157,24 @@ def test_more_dimensions_than_sobols_sequence_has_are_refused() -> None:
     with pytest.raises(ValueError, match=r"sampler: 21202 dimensions.* at most 21201; .*lat"):
         batches(Sobol(seed=0), count=1, dimensions=21_202)
     batches(LatinHypercube(), count=1, dimensions=21_202)
+
+
+def test_quarters_are_points_of_the_sequence_at_one_place_in_each_quarter() -> None:
+    quarters = batches(SobolQuarters(seed=6), count=8, dimensions=5).unflatten(1, (4, 4))
+    points = batches(Sobol(seed=6), count=8, chains=4, dimensions=5)
+    assert torch.equal(quarters[:, :, 0], points)
+    assert torch.equal(quarters[..., :-2], points[:, :, None, :-2].expand(-1, -1, 4, -1))
+    places = quarters[..., -2:].double()
+    assert ((places >= 0) & (places < 1)).all()
+    quarter = (2 * places).floor()
+    assert torch.equal((quarter[..., 0] + 2 * quarter[..., 1]).sort(dim=-1).values, ALL_QUARTERS)
+    within = (places % 0.5).sub(places[:, :, :1] % 0.5).abs()
+    assert within.max() < 1e-6  # half the range apart, no more and no less
+
+
+ALL_QUARTERS = torch.arange(4).double().expand(8, 4, 4)
+
+
+def test_quarters_take_four_patches_of_each_scene_vector() -> None:
+    with pytest.raises(ValueError, match=r"sampler\.chains: 6: give a multiple of 4"):
+        batches(SobolQuarters(seed=0), count=1, chains=6)
