@@ -80,6 +80,17 @@ def rows_of_small_runs(runs: pd.DataFrame) -> list[list[str]]:
     return rows
 
 
+def rows_of_cheap_runs(runs: pd.DataFrame) -> list[list[str]]:
+    """Of `budget=small`, after as many steps and paths, against ours as it is."""
+    kinds = {"ours_seen_whole": 1, "ours_quarters": 4}  # so many patches for one of 32x32
+    columns = {kind: changes_of(runs, kind, "ours_longer") for kind in kinds}
+    traced = runs.patches_traced
+    for kind, patches in kinds.items():
+        assert (traced[kind] == patches * traced["ours_longer"]).all()
+    scenes = traced["ours_longer"].index.unique("scene")
+    return [[mean_of(c.loc[scene]) for c in columns[kind]] for scene in scenes for kind in kinds]
+
+
 def test_what_runs_end_with_is_what_their_table_says(runs: pd.DataFrame) -> None:
     shown = [[cell.strip("*") for cell in row] for row in rows_of(PAGE, "In runs")]
     assert shown[2:] == rows_of_runs(runs)
@@ -94,6 +105,12 @@ def test_what_small_patches_cost_where_samples_are_few_is_what_their_runs_say() 
     evaluations = pd.read_csv(FOLDER / "small_patches.csv").query("budget == 'small'")
     shown = rows_of(PAGE, "What more scene vectors cost")[2:]
     assert shown == rows_of_small_runs(last_of(evaluations))
+
+
+def test_what_four_places_of_each_vector_gain_where_paths_are_cheap() -> None:
+    evaluations = pd.read_csv(FOLDER / "small_patches.csv").query("budget == 'small'")
+    shown = rows_of(PAGE, "Where paths are cheap: four places of each scene vector")[2:]
+    assert shown == rows_of_cheap_runs(last_of(evaluations))
 
 
 @pytest.mark.parametrize("page", ["README.md", "docs/guide/sampler.md", PAGE])
