@@ -91,6 +91,17 @@ def rows_of_cheap_runs(runs: pd.DataFrame) -> list[list[str]]:
     return [[mean_of(c.loc[scene]) for c in columns[kind]] for scene in scenes for kind in kinds]
 
 
+def rows_of_same_time(runs: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
+    """Scenes, and what four places of each vector have after as long as patches of 32x32."""
+    kinds = ("same_time_whole", "same_time_quarters")
+    columns, steps = changes_of(runs, kinds[1], kinds[0]), runs.step
+    scenes = [*steps[kinds[0]].index.unique("scene")]
+    return scenes, [
+        [*(f"{steps[kind, scene, 0]}" for kind in kinds), *(mean_of(c.loc[scene]) for c in columns)]
+        for scene in scenes
+    ]
+
+
 def test_what_runs_end_with_is_what_their_table_says(runs: pd.DataFrame) -> None:
     shown = [[cell.strip("*") for cell in row] for row in rows_of(PAGE, "In runs")]
     assert shown[2:] == rows_of_runs(runs)
@@ -108,9 +119,11 @@ def test_what_small_patches_cost_where_samples_are_few_is_what_their_runs_say() 
 
 
 def test_what_four_places_of_each_vector_gain_where_paths_are_cheap() -> None:
-    evaluations = pd.read_csv(FOLDER / "small_patches.csv").query("budget == 'small'")
-    shown = rows_of(PAGE, "Where paths are cheap: four places of each scene vector")[2:]
-    assert shown == rows_of_cheap_runs(last_of(evaluations))
+    runs = last_of(pd.read_csv(FOLDER / "small_patches.csv").query("budget == 'small'"))
+    shown = rows_of(PAGE, "Where paths are cheap: four places of each scene vector")
+    same_steps = rows_of_cheap_runs(runs)
+    assert shown[2 : 2 + len(same_steps)] == same_steps
+    assert shown[4 + len(same_steps) :] == rows_of_same_time(runs)[1]
 
 
 @pytest.mark.parametrize("page", ["README.md", "docs/guide/sampler.md", PAGE])
