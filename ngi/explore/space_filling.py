@@ -82,20 +82,13 @@ class Sobol(ProposalDistribution):
         return _large_steps(self._sequence.points(batch * count, count, dimensions), position)
 
 
-class SobolQuarters(ProposalDistribution):
+class SobolQuarters(Sobol):
     """As `Sobol`, with four patch positions of each scene vector, `SobolSequence.quarters`.
 
     A scene is set up, and its photons are traced, for each scene vector and not for each patch: a
     batch of small patches, a quarter of the pixels each, takes about as long as one of as many
     scene vectors with large ones, and sees more of each.
-
-    seed: the run's
     """
-
-    starts_chains = True
-
-    def __init__(self, *, seed: int) -> None:
-        self._sequence = SobolSequence(seed=seed)
 
     def propose(self, position: Tensor, generator: torch.Generator, *, batch: int) -> Proposals:
         """Nothing is drawn from `generator`. ValueError for n that is no multiple of 4."""
