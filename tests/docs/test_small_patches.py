@@ -168,6 +168,17 @@ def test_what_is_left_against_uniform_sampling_that_sees_patches_whole(runs: pd.
     assert set(runs.loc[WHOLE].index.get_level_values("seed")) == {0}
 
 
+def test_what_all_windows_take_off_is_what_their_pairs_with_large_patches_say(
+    runs: pd.DataFrame,
+) -> None:
+    cheap = last_of(pd.read_csv(FOLDER / "small_patches.csv").query("budget == 'small'"))
+    pairs = ((runs, WHOLE, "ours_uniform"), (cheap, "ours_seen_whole", "ours_longer"))
+    hard = pd.concat([changes_of(*pair)[0] for pair in pairs])
+    least, most, word = said(PAGE, r"took (\S+) to (\S+) % off hard frames in the (\w+) pairs")
+    assert [least, most] == [f"{-100 * change:.1f}" for change in (hard.max(), hard.min())]
+    assert (word, len(hard)) == ("five", 5)
+
+
 def test_intervals_over_seeds_have_no_0_in_them(runs: pd.DataFrame) -> None:
     scenes = said(PAGE, r"several seeds, on (\S+) and (\S+), which")
     for changes in changes_of(runs, SMALL, "ours_uniform")[:2]:
