@@ -199,6 +199,45 @@ def test_what_can_be_told_is_what_the_studys_runs_say() -> None:
     assert shown == pytest.approx([round(-100 * value, 1) for value in expected])
 
 
+def of_cheap_choices() -> pd.DataFrame:
+    """Of 4,096 patches of 32 samples per pixel, by scene, choice and seed."""
+    runs = pd.read_csv(FOLDER / "small_relative.csv")
+    runs.loc[runs.patches == 4096, "choice"] = "all"
+    return runs.set_index(["scene", "choice", "seed"]).sort_index()
+
+
+def rows_of_cheap_choices() -> list[list[str]]:
+    """One for each scene, then one over the scenes."""
+    runs = of_cheap_choices()
+    uniform = runs.xs("uniform", level="choice")
+    columns = [
+        (runs.xs(choice, level="choice")[error] / uniform[error] - 1).dropna()
+        for choice, error in (
+            *(("oracle_relative", f"{f}_{kind}") for f in FRAMES for kind in ("error", "tail")),
+            ("all", "hard_error"),
+        )
+    ]
+    rows = [
+        [mean_of(c.loc[scene]) if scene in c.index.unique("scene") else "" for c in columns]
+        for scene in uniform.index.unique("scene")
+    ]
+    return [*rows, over_scenes(columns)]
+
+
+def test_what_a_choice_takes_off_where_paths_are_cheap_is_what_the_studys_runs_say() -> None:
+    shown = [[cell.strip("*") for cell in row] for row in rows_of(PAGE, "Where paths are cheap")]
+    rows = rows_of_cheap_choices()
+    assert shown[2:] == rows
+    number = r"(\d+\.\d) % ± (\d+\.\d)"
+    takes = rf"takes {number} off hard frames and {number} off their worst pixels, {number} off "
+    said_of_all = said(PAGE, rf"\*\*It {takes}uniform frames and {number} off theirs")
+    assert [*said_of_all] == less(rows[-1][:4])
+    hard = [float(row[0].split()[0].replace("−", "-")) for row in rows[:-1]]
+    scenes = of_cheap_choices().index.unique("scene")
+    much = [scene for scene, change in zip(scenes, hard, strict=True) if change <= -5]
+    assert [*said(PAGE, r"There is 5 % and more to be had on (\S+) alone")] == much
+
+
 @pytest.mark.parametrize("page", ["docs/guide/sampler.md", PAGE])
 def test_what_is_said_of_all_runs_is_the_last_row_of_their_table(page: str) -> None:
     shown = said(
