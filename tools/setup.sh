@@ -32,10 +32,12 @@ if ! command -v nvidia-smi >/dev/null 2>&1 && [ -z "${PIP_EXTRA_INDEX_URL:-}${PI
     echo "setup: no NVIDIA driver here; if pip fetches PyTorch with gigabytes of CUDA libraries," \
         "PIP_EXTRA_INDEX_URL=<PyTorch's CPU index> make avoids that"
 fi
-# Without compiling: of 18,000 files a third is ever imported, and compiled then.
 "$VENV/bin/python" -m pip install --quiet --disable-pip-version-check \
     --no-compile --constraint constraints.txt --editable '.[dev,joblib,slurm,viewer,video,denoise,export,tensorboard,mlflow]' ||
     fail "pip could not install the dependencies; its message stands above"
+# On all cores, where pip compiles one file after the other; some are of other versions of Python.
+# Now, because containers often forbid it to later imports; the libraries' own tests are a fifth.
+"$VENV/bin/python" -m compileall -qq -j 0 -x '/tests/' "$VENV/lib" || true
 
 # LPIPS needs AlexNet's weights; without them its column stays empty. LPIPS=no leaves them out.
 [ "${LPIPS:-yes}" = no ] || "$VENV/bin/python" -m ngi.evaluate.lpips_download || true
