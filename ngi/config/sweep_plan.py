@@ -117,7 +117,8 @@ def planned_run(config: DictConfig, costs: dict[str, float | None]) -> Planned:
 @cache
 def _read(reader: str) -> None:
     """Makes a reader, given as JSON, to see whether the scene can be read."""
-    instantiate(OmegaConf.create({"scene": {"reader": json.loads(reader)}}))
+    words = OmegaConf.create({"scene": {"reader": json.loads(reader)}})
+    instantiate(words, _convert_="all")  # or OmegaConf takes the scene itself for a configuration
 
 
 def _state(config: DictConfig, folder: Path) -> str:

@@ -167,6 +167,15 @@ def test_seconds_are_known_and_one_run_alone_has_a_dry_run_too(tmp_path: Path) -
     assert not (tmp_path / "outputs").exists()
 
 
+@pytest.mark.parametrize("scene", ["mirror", "archviz"])
+def test_a_path_traced_scene_has_a_dry_run_too(scene: str, tmp_path: Path) -> None:
+    """Whatever its description holds: tuples of names and paths were once none of OmegaConf's."""
+    words = (f"scene={scene}", "budget=seconds", "budget.seconds=90", PLACE, "--dry-run")
+    status, output = run_module("ngi.train", *words, folder=tmp_path)
+    assert status == 0, output
+    assert "1 run: 1 new; about 1:30 of training left" in output
+
+
 def test_steps_take_what_they_were_measured_to_cost(tmp_path: Path) -> None:
     """The cost file is written by hand: as many seconds a step as its components have together."""
     from ngi.config.build import run_components
