@@ -29,7 +29,7 @@ view: setup ## trained networks in the browser: SCENE=living-room|sphere-caustic
 
 test: setup ## linter, type checker, all tests, smoke run on real renders
 	@$(MAKE) --no-print-directory --jobs=3 lint smoke browser
-	@OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
+	@OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n $$(($$(nproc) + 1)) --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 
 lint: setup
 	@$(BIN)/ruff check .

@@ -19,6 +19,20 @@ SETS = ("hard", "uniform")
 TYPICAL = {"mape": 0.2, "dssim": 0.04, "mae": 0.05, "lpips": 0.3}
 PICTURE = 32
 
+
+@pytest.fixture
+def undrawn(monkeypatch) -> None:
+    """Figures are files without a picture: drawing takes seconds, and some tests read texts."""
+
+    def savefig(_figure, stream, *, format: str, dpi: float, **_) -> None:
+        if format == "svg":
+            stream.write(b'<svg xmlns="http://www.w3.org/2000/svg"/>')
+        else:
+            Image.new("RGB", (1, 1)).save(stream, format, dpi=(dpi, dpi))
+
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", savefig)
+
+
 MakeRun = Callable[..., Path]
 
 

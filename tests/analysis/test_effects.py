@@ -212,6 +212,7 @@ def test_runs_of_two_experiments_are_not_paired(make_method, tmp_path) -> None:
     assert pair_runs(find_runs(tmp_path)[0], "living-room", "active_exploration", "uniform") == []
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_ways_that_claims_leave_out_are_said(make_method, tmp_path, capsys) -> None:
     for method in ("active_exploration", "uniform"):
         make_method(method)

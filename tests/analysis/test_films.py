@@ -86,6 +86,7 @@ def test_a_damaged_film_is_left_out_with_a_warning(runs, content: str) -> None:
     assert "video_damaged.json" in warning
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_the_report_has_them_in_its_page_and_its_tables(runs, capsys) -> None:
     (runs / "video_damaged.json").write_text("{")
     assert main([str(runs)]) == 0

@@ -273,6 +273,7 @@ def test_runs_that_test_no_claim_make_a_page_too(plain) -> None:
     assert (row["method"], row["baseline"]) == ("mcmc_loss_step", "uniform sampling")
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_what_runs_lack_leaves_the_rest_of_the_page(make_run, tmp_path) -> None:
     def spoil(result: dict) -> None:
         result["metrics"]["hard"]["mape"]["mean"] = math.nan

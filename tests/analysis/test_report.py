@@ -80,6 +80,7 @@ def test_what_else_all_runs_of_a_scene_have_is_drawn(two_scenes, metric: str) ->
     assert drawn["sphere-caustic"].count("LPIPS") == 2
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_comparison_sheets_show_reference_and_both_methods(one_scene, tmp_path) -> None:
     assert main([str(one_scene), "--output", str(tmp_path / "out")]) == 0
     pictures = tmp_path / "out" / "pictures"
@@ -98,6 +99,7 @@ def test_comparison_sheets_show_reference_and_both_methods(one_scene, tmp_path) 
         assert overview.size == (width, 3 * (256 + 32) + height - (256 + 32))
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_overview_shows_where_methods_differ_most(one_scene, tmp_path) -> None:
     assert main([str(one_scene), "--output", str(tmp_path)]) == 0
     with Image.open(tmp_path / "pictures" / "mirror.png") as overview:
@@ -107,6 +109,7 @@ def test_overview_shows_where_methods_differ_most(one_scene, tmp_path) -> None:
     assert np.array_equal(first, expected)  # the fixture's frame 3 has the largest spread
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_errors_that_are_not_finite_do_not_hide_where_methods_differ(make_run, tmp_path) -> None:
     def diverge(result: dict) -> None:
         for frame in result["frames"]:
@@ -124,6 +127,7 @@ def test_errors_that_are_not_finite_do_not_hide_where_methods_differ(make_run, t
     assert np.array_equal(first, expected)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_doubtful_comparisons_are_a_warning(one_scene, make_run, capsys) -> None:
     def elsewhere(result: dict) -> None:
         result["machine"] = {"processor": "another", "backend": "llvm"}
@@ -142,17 +146,20 @@ def test_doubtful_comparisons_are_a_warning(one_scene, make_run, capsys) -> None
     assert f"another, llvm in {folder}" in written
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_scenes_may_take_different_times(one_scene, make_run, capsys) -> None:
     make_run(scene="sphere-caustic", change=lambda result: result.update(run_seconds=900.0))
     assert main([str(one_scene)]) == 0
     assert capsys.readouterr().err == ""
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_floors_that_are_lower_bounds_are_called_so(one_scene, capsys) -> None:
     assert main([str(one_scene)]) == 0
     assert "for DSSIM and LPIPS a lower bound" in capsys.readouterr().out
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_missing_pictures_are_a_warning(two_scenes, capsys) -> None:
     (two_scenes / "mirror" / "uniform" / "seed=0" / "pictures" / "hard_01_error.png").unlink()
     assert main([str(two_scenes)]) == 0
@@ -161,6 +168,7 @@ def test_missing_pictures_are_a_warning(two_scenes, capsys) -> None:
     assert "sphere-caustic.png" in output.out
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_left_out_runs_are_a_warning(one_scene, capsys) -> None:
     folder = one_scene / "mirror" / "uniform" / "seed=0"
     (folder / "result.json").unlink()
@@ -168,6 +176,7 @@ def test_left_out_runs_are_a_warning(one_scene, capsys) -> None:
     assert f"warning: left out: {folder}: unfinished" in capsys.readouterr().err
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_why_lpips_is_empty_is_said(make_run, tmp_path, capsys) -> None:
     make_run(lpips=False)
     assert main([str(tmp_path)]) == 0

@@ -141,6 +141,7 @@ def test_what_cannot_be_read_is_left_out_of_the_report(make_run, tmp_path, damag
     assert reason in warning
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_the_rest_is_reported(make_run, tmp_path, capsys) -> None:
     for seed in (0, 1):
         write_logs(make_run(seed=seed))

@@ -20,6 +20,7 @@ def runs(make_run, tmp_path, monkeypatch) -> Path:
     return tmp_path / "runs"
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_tables_are_an_artifact_beside_the_runs(runs: Path, capsys) -> None:
     assert main([str(runs), "--wandb", "caustics"]) == 0
     (file,) = (runs / "report" / "wandb").glob("offline-run-*/*.wandb")
@@ -38,6 +39,7 @@ def test_tables_are_an_artifact_beside_the_runs(runs: Path, capsys) -> None:
     assert table["data"][0][:3] == results.iloc[0, :3].tolist()
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_what_fails_there_is_said_and_the_report_is_written(
     runs: Path, monkeypatch, capsys
 ) -> None:

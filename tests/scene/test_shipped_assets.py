@@ -48,7 +48,7 @@ SAMPLES_PER_PIXEL = {  # while training, the paper's Table 1
 }
 
 KEPT_MEMORY = {"MALLOC_MMAP_THRESHOLD_": str(2**25), "MALLOC_TRIM_THRESHOLD_": str(2**31 - 1)}
-"""Of glibc: a large array's memory is the next one's, or page faults are half of a script's time."""
+"""Of glibc: a large array has the last one's memory; its page faults took half of the time."""
 
 by_folder = pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
 
