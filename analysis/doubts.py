@@ -17,6 +17,10 @@ MOST_KEYS = 3
 """Of the settings that differ, that are named."""
 
 
+def _shown(seconds: float) -> str:
+    return f"{seconds:.{0 if seconds >= 100 else 1}f} s"
+
+
 def comparison_warnings(runs: Sequence[Run]) -> list[str]:
     """What makes a comparison doubtful without forbidding it, a line each.
 
@@ -33,8 +37,8 @@ def comparison_warnings(runs: Sequence[Run]) -> list[str]:
         shortest, longest = min(times, key=times.__getitem__), max(times, key=times.__getitem__)
         if times[longest] > (1 + MOST_TIME_APART) * times[shortest]:
             warnings.append(
-                f"{scene}: the runs were not given the same time: {times[shortest]:.0f} s in "
-                f"{shortest}, {times[longest]:.0f} s in {longest}"
+                f"{scene}: the runs were not given the same time: {_shown(times[shortest])} in "
+                f"{shortest}, {_shown(times[longest])} in {longest}"
             )
     if changed := [r.folder for r in runs if any(v.get("dirty") for v in r.versions)]:
         warnings.append(

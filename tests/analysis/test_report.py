@@ -147,6 +147,16 @@ def test_doubtful_comparisons_are_a_warning(one_scene, make_run, capsys) -> None
 
 
 @pytest.mark.usefixtures("undrawn")
+def test_short_times_are_told_apart(make_run, tmp_path, capsys) -> None:
+    for sampler, seconds in (("uniform", 4.6), ("mcmc_loss", 5.3)):
+        make_run(sampler=sampler, change=lambda result, t=seconds: result.update(run_seconds=t))
+    assert main([str(tmp_path / "runs")]) == 0
+    told = capsys.readouterr().err
+    assert "the same time: 4.6 s in" in told
+    assert ", 5.3 s in" in told
+
+
+@pytest.mark.usefixtures("undrawn")
 def test_scenes_may_take_different_times(one_scene, make_run, capsys) -> None:
     make_run(scene="sphere-caustic", change=lambda result: result.update(run_seconds=900.0))
     assert main([str(one_scene)]) == 0
