@@ -8,6 +8,9 @@ from ngi.learn.noise import without_noise
 
 REMEMBERED = 1024
 
+FEWEST = 20
+"""Patches of which 5 % are at least one: of fewer, one is counted for less than it is."""
+
 
 class NewLosses:
     """The losses of the newest patches, at most `REMEMBERED`, each before it was trained on.
@@ -30,12 +33,12 @@ class NewLosses:
 
     @property
     def worst_share(self) -> float | None:
-        """Of the newer half of them, see `worst_share`; None where there are none, or all are 0.
+        """Of the newer half of them, see `worst_share`; None of fewer than `FEWEST`, or all 0.
 
         The older half may be that of a network which had not learnt anything yet.
         """
         newer = self._losses[len(self._losses) // 2 :]
-        return worst_share(newer) if newer.any() else None
+        return worst_share(newer) if len(newer) >= FEWEST and newer.any() else None
 
     def state_dict(self) -> list[float]:
         return self._losses.tolist()

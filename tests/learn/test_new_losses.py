@@ -23,6 +23,15 @@ def test_exponential_losses_have_the_share_that_the_integral_says() -> None:
     assert worst_share(-(1 - quantiles).log()) == pytest.approx(share, rel=1e-3)
 
 
+def test_of_fewer_than_twenty_nothing_is_said() -> None:
+    """One of eight is no twentieth: runs of seconds said that a third of the loss is rare."""
+    found = NewLosses()
+    found.add(torch.full((38,), 0.3), None)
+    assert found.worst_share is None
+    found.add(torch.full((1,), 0.3), None)
+    assert found.worst_share == pytest.approx(0.05)
+
+
 def test_the_newer_half_of_what_is_remembered_counts() -> None:
     found = NewLosses()
     assert found.worst_share is None
