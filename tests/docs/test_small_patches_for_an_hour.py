@@ -1,0 +1,71 @@
+"""What docs/exploration-ceiling/small-patches.md says of an hour's budget is what its runs say."""
+
+import numpy as np
+import pandas as pd
+
+from tests.docs.test_ceiling_figures import rows_of, tenths
+from tests.docs.test_figures import geometric_mean, said
+from tests.docs.test_from_buffers import FOLDER
+
+PAGE = "docs/exploration-ceiling/small-patches.md"
+SECTION = "For an hour"
+FRAMES = ("hard", "uniform")
+
+
+def errors_of(runs: pd.DataFrame) -> pd.DataFrame:
+    """Of one scene, over its seeds: hard and uniform, by the number of the evaluation."""
+    number = runs.groupby(["seed", "commit"]).cumcount()
+    logs = {frames: np.log(geometric_mean(runs, frames)) for frames in FRAMES}
+    return np.exp(pd.DataFrame(logs).groupby(number).mean())
+
+
+def steps_of(runs: pd.DataFrame) -> pd.Series:
+    """The fewest steps of each evaluation's."""
+    return runs.step.groupby(runs.groupby(["seed", "commit"]).cumcount()).min()
+
+
+def as_many_steps(error: float, errors: pd.Series, steps: pd.Series) -> str:
+    """Where the curve of errors falls to this one, both axes logarithmic."""
+    falling = errors.cummin()
+    if error < falling.iloc[-1]:
+        return f"more than {steps.iloc[len(falling) - 1]:,}"
+    logs = np.interp(-np.log(error), -np.log(falling), np.log(steps.iloc[: len(falling)]))
+    return f"{round(float(np.exp(logs)), -2):,.0f}"
+
+
+def rows_of_hours() -> list[list[str]]:
+    """One for each evaluation of each scene."""
+    small = pd.read_csv(FOLDER / "hour_small_patches.csv")
+    large = pd.read_csv(FOLDER / "hour_h200.csv").query("method == 'ours_uniform'")
+    rows = []
+    for scene, own in small.groupby("scene"):
+        base = large[large.scene == scene]
+        ours, uniform = errors_of(own), errors_of(base)
+        for number, (step, patches) in enumerate(zip(own.step, own.patches_traced, strict=True)):
+            assert abs(step / steps_of(base)[number] - 1) < 0.001
+            before, now = uniform.loc[number], ours.loc[number]
+            needed = as_many_steps(now.hard, uniform.hard, steps_of(base))
+            changes = [tenths(now[frames] / before[frames] - 1) for frames in FRAMES]
+            absolute = [f"{each.hard:.4f}" for each in (before, now)]
+            rows.append([f"{step:,}", f"{patches:,}", *absolute, *changes, needed])
+    return rows
+
+
+def test_an_hour_s_errors_and_steps_are_what_the_runs_say() -> None:
+    shown = [[cell.strip("*") for cell in row] for row in rows_of(PAGE, SECTION)]
+    assert shown[2:] == rows_of_hours()
+
+
+def test_how_many_steps_it_saves_is_what_the_runs_say() -> None:
+    rows = rows_of_hours()
+    scenes = pd.read_csv(FOLDER / "hour_small_patches.csv").scene
+    row = [cells for scene, cells in zip(scenes, rows, strict=True) if scene == "living-room"][-1]
+    found = said(PAGE, r"after ([\d,]+) steps it has the error .*? needs ((?:more than )?[\d,]+)")
+    assert found == (row[0], row[-1])
+    words = (
+        r"after ([\d,]+) steps on living-room the error for which uniform sampling needs ([\d,]+)"
+    )
+    for page in ("README.md", "CHANGELOG.md"):
+        assert said(page, words) == (row[0], row[-1])
+    overview = "docs/exploration-ceiling/README.md"
+    assert said(overview, r"way on living-room, with ([\d.]+) % less") == (row[4].lstrip("−"),)
