@@ -8,8 +8,10 @@ import matplotlib
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.figure import Figure
 from PIL import Image
 
+from analysis import plots
 from analysis.curves import error_curve
 from analysis.methods import name_methods
 from analysis.plots import COLOURS, method_styles
@@ -201,6 +203,25 @@ def test_what_cannot_be_reported_is_one_line_and_writes_nothing(make_run, tmp_pa
     assert error.startswith("error: runs of two protocols")
     assert error.count("\n") == 1
     assert not (tmp_path / "runs" / "report").exists()
+
+
+def test_a_figure_s_files_are_arranged_alike(tmp_path, monkeypatch) -> None:
+    figure = plots.new_figure(6, 3)
+    for axes in figure.subplots(1, 2):
+        axes.set_title("a title that is as wide as its panel")
+        axes.set_ylabel("errors")
+    before, places = [axes.get_position().bounds for axes in figure.axes], []
+    drawn = plots.figure_bytes
+
+    def noted(figure: Figure, suffix: str) -> bytes:
+        data = drawn(figure, suffix)
+        places.append([axes.get_position().bounds for axes in figure.axes])
+        return data
+
+    monkeypatch.setattr(plots, "figure_bytes", noted)
+    written = plots.save_figure(figure, tmp_path, "two panels")
+    assert [file.name for file in written] == ["two panels.png", "two panels.svg"]
+    assert places[0] == places[1] != before
 
 
 def test_method_keeps_its_colour_in_every_scene(two_scenes) -> None:
