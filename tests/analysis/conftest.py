@@ -19,6 +19,8 @@ SETS = ("hard", "uniform")
 TYPICAL = {"mape": 0.2, "dssim": 0.04, "mae": 0.05, "lpips": 0.3}
 PICTURE = 32
 
+MakeRun = Callable[..., Path]
+
 
 @pytest.fixture
 def undrawn(monkeypatch) -> None:
@@ -31,9 +33,6 @@ def undrawn(monkeypatch) -> None:
             Image.new("RGB", (1, 1)).save(stream, format, dpi=(dpi, dpi))
 
     monkeypatch.setattr("matplotlib.figure.Figure.savefig", savefig)
-
-
-MakeRun = Callable[..., Path]
 
 
 def final_error(set_name: str, metric: str, quality: float, seed: int) -> float:
