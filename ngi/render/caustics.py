@@ -7,6 +7,7 @@ set of points, as those of direct light: no seed.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -14,8 +15,11 @@ from torch.quasirandom import SobolEngine
 
 from ngi.machine.backend import dr, mi
 from ngi.render.irradiance_pictures import IrradiancePictures
+from ngi.render.materials import children_of, has_bsdf
 from ngi.render.specular import SpecularChain
 from ngi.scene.variable_scene import VariableScene
+
+_logger = logging.getLogger(__name__)
 
 PHOTONS = 2**12
 
@@ -49,11 +53,13 @@ class Mirror:
 class Caustics:
     """Traces the photons of a scene.
 
-    chain: what they follow. mirrors: where they start, at least one.
+    chain: what they follow. mirrors: where they start, at least one. principled: BSDFs of that
+        kind, or with such a side, whose base colour counts as that of a diffuse one.
     """
 
     chain: SpecularChain
     mirrors: list[Mirror]
+    principled: list[mi.BSDF]
     pictures: IrradiancePictures
 
     def trace(self, scene: mi.Scene, photons: Sequence[mi.Float]) -> mi.Float:
@@ -75,16 +81,22 @@ class Caustics:
         power = dr.select((density > 0) & (towards.pdf > 0), power, 0)
         ray = start.spawn_ray(towards.d)  # off the surface, and back onto it
         ray.d = -towards.d
-        end = self.chain.follow(scene, ray)
+        end = self.chain.follow(scene, ray, dr.max(power) > 0)
         counts = (end.segments > 1) & _is_diffuse(end.hit)  # it has met something specular
         return self.pictures.of_photons(end.hit, dr.select(counts, power * end.throughput, 0))
 
     def radiance(self, traced: mi.Float, hit: mi.SurfaceInteraction3f) -> mi.Color3f:
         """Linear radiance that leaves the diffuse part of a hit's BSDF because of caustics."""
         active = _is_diffuse(hit)
-        reflectance = hit.bsdf().eval_diffuse_reflectance(hit, active)
+        # Where photons came from is not kept: as if from along the normal.
+        along = mi.Vector3f(0, 0, dr.mulsign(mi.Float(1), mi.Frame3f.cos_theta(hit.wi)))
+        scattered = hit.bsdf().eval(_diffuse_part(), hit, along, active)
+        for bsdf in self.principled:  # which have no part of their own
+            here = has_bsdf(hit, bsdf, active)
+            base = bsdf.eval_diffuse_reflectance(hit, here) / dr.pi
+            scattered = dr.select(here, base, scattered)
         irradiance = self.pictures.irradiance(traced, hit)
-        return dr.select(active, irradiance * reflectance / dr.pi, 0)
+        return dr.select(active, irradiance * scattered, 0)
 
 
 def caustics_of(scene: VariableScene, chain: SpecularChain) -> Caustics | None:
@@ -94,15 +106,17 @@ def caustics_of(scene: VariableScene, chain: SpecularChain) -> Caustics | None:
         bounces = min(bounces, chain.longest_path - 2)
     specular = [surface.material.bsdf for surface in chain.surfaces]
     mirrors = [
-        Mirror(shape, instance)
+        mirror
         for shape, instance in scene.placed()
         if any(bsdf in specular for bsdf in scene.bsdfs_of(shape))
+        and (mirror := _mirror(shape, instance)) is not None
     ]
     if not mirrors or bounces < 1:
         return None
     return Caustics(
         replace(chain, maximum_bounces=bounces, highlights=False, photons=True),
         mirrors,
+        [bsdf for bsdf in scene.bsdfs() if _is_of_kind(bsdf, "Principled")],
         IrradiancePictures(scene.description.bounds),
     )
 
@@ -119,6 +133,27 @@ def photon_points() -> list[mi.Float]:
     numbers = [dr.gather(mi.Float, flat, 5 * every + dimension) for dimension in range(5)]
     dr.eval(numbers)
     return numbers
+
+
+def _mirror(shape: mi.Shape, instance: mi.Shape | None) -> Mirror | None:
+    """None for what Mitsuba draws no points of, as curves."""
+    try:
+        return Mirror(shape, instance)
+    except RuntimeError as error:
+        _logger.warning("'%s' throws no caustics: %s", shape.id(), error)
+        return None
+
+
+def _is_of_kind(bsdf: mi.BSDF, kind: str) -> bool:
+    """Whether it is, or one that it is made of."""
+    children = [child for child in children_of(bsdf).values() if isinstance(child, mi.BSDF)]
+    return bsdf.class_name() == kind or any(_is_of_kind(child, kind) for child in children)
+
+
+def _diffuse_part() -> mi.BSDFContext:
+    context = mi.BSDFContext()
+    context.type_mask = int(mi.BSDFFlags.DiffuseReflection)
+    return context
 
 
 def _is_diffuse(hit: mi.SurfaceInteraction3f) -> mi.Bool:

@@ -27,10 +27,10 @@ TOLERANCE = 8
 """Cells between a surface and the light of its picture, beyond which it is another surface's."""
 
 _RESOLUTION = 2.0**-20
-"""Of the sums over photons."""
+"""Of the sums over photons, in units of the brightest one."""
 
-_BRIGHTEST = 1e4
-"""Irradiance that one photon adds at most."""
+_NO_LIGHT = 1e-30
+"""Irradiance of the brightest photon where none arrives."""
 
 
 @dataclass(frozen=True)
@@ -49,18 +49,21 @@ class IrradiancePictures:
         """
         picture, x, y, depth = self._place(hit)
         column, row = mi.Int32(dr.floor(x)), mi.Int32(dr.floor(y))
-        active = (dr.max(power) > 0) & _inside(column, row)
+        active = (dr.max(power) > 0) & dr.isfinite(dr.max(power)) & _inside(column, row)
         index = mi.UInt32((picture * CELLS + row) * CELLS + column)
-        light = dr.minimum(power / self._cell**2, _BRIGHTEST)
+        light = power / self._cell**2
+        dr.eval(light, active, index, depth)  # together, or photons are traced twice
+        unit = dr.maximum(dr.max(dr.select(active, dr.max(light), 0)), _NO_LIGHT)
+        light /= unit
         mean = dr.mean(light)
-        values = (*light, dr.square(mean), mean * depth)
+        values = (*light, mean * depth, dr.square(mean))
         sums = [dr.zeros(mi.UInt64, 6 * CELLS * CELLS) for _ in values]
         for total, value in zip(sums, values, strict=True):
             number = mi.Int64(dr.round(value / _RESOLUTION))
             # CUDA adds none with a sign. A copy per thread, the default, would be 63 MB to clear.
             dr.scatter_add(total, mi.UInt64(number), index, active, dr.ReduceMode.Local)
         dr.eval(sums)
-        return _resolved([mi.Float(mi.Int64(total)) * _RESOLUTION for total in sums])
+        return _resolved([mi.Float(mi.Int64(total)) * _RESOLUTION for total in sums], unit)
 
     def dark(self) -> mi.Float:
         """As `of_photons` where none arrives."""
@@ -103,18 +106,19 @@ class IrradiancePictures:
         )
 
 
-def _resolved(sums: list[mi.Float]) -> mi.Float:
+def _resolved(sums: list[mi.Float], unit: mi.Float) -> mi.Float:
     """Of each cell the finest level at which enough photons have arrived, blended with the next.
 
-    sums: irradiance in R, G and B; of its mean over them the sum of squares, and times the depth.
+    sums: irradiance in R, G and B, its mean over them times the depth, and the mean's squares.
+    unit: of irradiance in the sums.
     """
-    levels = [sums]
+    levels = [_Level.of(*sums)]
     for level in range(1, LEVELS):
-        levels.append(_coarser(levels[-1], level))
+        levels.append(levels[-1].coarser(CELLS >> level))
     index, picture, row, column = _cells(CELLS)
     light, depth, photons = mi.Color3f(0), mi.Float(-2 * CELLS), mi.Float(0)
     for level in reversed(range(LEVELS)):
-        *total, squares, deep = _interpolated(levels[level], picture, column, row, level)
+        *total, deep, squares = levels[level].interpolated(picture, column, row, level)
         mean = dr.mean(mi.Color3f(total))
         # What is expected of this level: chosen by what it has, too much light would be found.
         enough = 1 if level == LEVELS - 1 else dr.clip(2 * photons / ENOUGH_PHOTONS - 1, 0, 1)
@@ -122,40 +126,56 @@ def _resolved(sums: list[mi.Float]) -> mi.Float:
         light = dr.lerp(light, mi.Color3f(total) / 4**level, enough)
         depth = dr.select(mean > 0, deep / mean, depth)
     packed = dr.zeros(mi.Float, 4 * 6 * CELLS * CELLS)
-    dr.scatter(packed, mi.Vector4f(*light, depth), index)
+    dr.scatter(packed, mi.Vector4f(*(light * unit), depth), index)
     return packed
 
 
-def _coarser(finer: list[mi.Float], level: int) -> list[mi.Float]:
-    """Sums over the four cells of the finer level that are one of this level's."""
-    cells = CELLS >> level
-    _, picture, row, column = _cells(cells)
-    first = (picture * cells * 2 + row * 2) * cells * 2 + column * 2
-    corners = (first, first + 1, first + cells * 2, first + cells * 2 + 1)
-    sums = [sum(dr.gather(mi.Float, total, corner) for corner in corners) for total in finer]
-    dr.eval(sums)
-    return sums
+@dataclass(frozen=True)
+class _Level:
+    """Sums over the photons of each cell.
+
+    first: four of them, side by side, so that a cell's are read at once. last: the fifth.
+    """
+
+    first: mi.Float
+    last: mi.Float
+
+    @classmethod
+    def of(cls, *sums: mi.Float) -> _Level:
+        level = cls(dr.ravel(mi.Vector4f(*sums[:4])), mi.Float(sums[4]))
+        dr.eval(level.first, level.last)
+        return level
+
+    def at(self, cell: mi.UInt32) -> tuple[mi.Float, ...]:
+        return *dr.gather(mi.Vector4f, self.first, cell), dr.gather(mi.Float, self.last, cell)
+
+    def coarser(self, cells: int) -> _Level:
+        """Sums over the four cells that are one of this many a row."""
+        _, picture, row, column = _cells(cells)
+        corner = (picture * cells * 2 + row * 2) * cells * 2 + column * 2
+        four = [self.at(corner + step) for step in (0, 1, cells * 2, cells * 2 + 1)]
+        return _Level.of(*(sum(values) for values in zip(*four, strict=True)))
+
+    def interpolated(
+        self, picture: mi.UInt32, column: mi.UInt32, row: mi.UInt32, level: int
+    ) -> tuple[mi.Float, ...]:
+        """Between the level's cells, at the centres of those of the finest level."""
+        cells = CELLS >> level
+        if level == 0:
+            return self.at((picture * cells + row) * cells + column)
+        result: tuple[mi.Float, ...] = (mi.Float(0),) * 5
+        x, y = ((mi.Float(place) + 0.5) / 2**level for place in (column, row))
+        for i, j, weight in _bilinear(x, y):
+            i, j = (dr.clip(place, 0, cells - 1) for place in (i, j))
+            here = self.at(mi.UInt32((mi.Int32(picture) * cells + j) * cells + i))
+            result = tuple(a + weight * b for a, b in zip(result, here, strict=True))
+        return result
 
 
 def _cells(count: int) -> tuple[mi.UInt32, mi.UInt32, mi.UInt32, mi.UInt32]:
     """Index, picture, row and column of every cell; count: of columns."""
     index = dr.arange(mi.UInt32, 6 * count * count)
     return index, index // (count * count), index // count % count, index % count
-
-
-def _interpolated(
-    totals: list[mi.Float], picture: mi.UInt32, column: mi.UInt32, row: mi.UInt32, level: int
-) -> list[mi.Float]:
-    """Between a level's cells, at the centres of those of the finest level."""
-    cells = CELLS >> level
-    x, y = ((mi.Float(place) + 0.5) / 2**level for place in (column, row))
-    result = [mi.Float(0) for _ in totals]
-    for i, j, weight in _bilinear(x, y):
-        i, j = (dr.clip(place, 0, cells - 1) for place in (i, j))
-        index = mi.UInt32((mi.Int32(picture) * cells + j) * cells + i)
-        for k, total in enumerate(totals):
-            result[k] = result[k] + weight * dr.gather(mi.Float, total, index)
-    return result
 
 
 def _bilinear(x: mi.Float, y: mi.Float) -> list[tuple[mi.Int32, mi.Int32, mi.Float]]:

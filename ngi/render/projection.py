@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ngi.machine.backend import mi
+from ngi.scene import transforms
 from ngi.scene.variable_scene import VariableScene
 
 
@@ -49,6 +50,7 @@ class Projection:
         require_told_camera(scene)
         parameters = mi.traverse(scene.scene.sensors()[0])
         self._authored = np.array(parameters["to_world"].matrix, dtype=np.float64).reshape(4, 4)
+        self._as_authored = transforms.mirroring(transforms.mirrors(self._authored))
         self._fov = float(np.ravel(parameters["x_fov"])[0])
         self._shift = [float(np.ravel(parameters[f"principal_point_offset_{a}"])[0]) for a in "xy"]
 
@@ -60,7 +62,7 @@ class Projection:
         found = []
         for v in scene_vectors:
             placed = self._description.camera_to_world(v)
-            camera = self._authored if placed is None else placed
+            camera = self._authored if placed is None else placed @ self._as_authored
             fov = self._description.field_of_view(v) or self._fov
             found.append(self._to_film(fov) @ np.linalg.inv(camera) @ to_world)
         return np.array(found).reshape(-1, 4, 4)
@@ -68,13 +70,13 @@ class Projection:
     def _to_film(self, fov: float) -> NDArray[np.float64]:
         """[4, 4]: from the camera's own coordinates.
 
-        A film coordinate is 1/2 + offset - x / (2 z tan(fov / 2)); local x is to the left, y up.
+        A film coordinate is 1/2 - offset - x / (2 z tan(fov / 2)); local x is to the left, y up.
         """
         half = np.tan(np.radians(fov) / 2)
         return np.array(
             [
-                [-0.5 / half, 0, 0.5 + self._shift[0], 0],
-                [0, -0.5 / half, 0.5 + self._shift[1], 0],
+                [-0.5 / half, 0, 0.5 - self._shift[0], 0],
+                [0, -0.5 / half, 0.5 - self._shift[1], 0],
                 [0, 0, 1, 0],
                 [0, 0, 1, 0],
             ]

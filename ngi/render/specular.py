@@ -66,8 +66,10 @@ class SpecularChain:
     highlights: bool
     photons: bool = False
 
-    def follow(self, scene: mi.Scene, ray: mi.Ray3f) -> ChainEnd:
+    def follow(self, scene: mi.Scene, ray: mi.Ray3f, active: bool | mi.Bool = True) -> ChainEnd:
         """A loop in the kernel, or in Python where the variant is scalar.
+
+        active: rays that are not meet nothing.
 
         No ray is intersected twice: the loop hands on where it meets something, and at what.
         """
@@ -102,12 +104,12 @@ class SpecularChain:
         ray, met, throughput, variance, emitted, segments, _ = dr.while_loop(
             state=(
                 mi.Ray3f(ray),
-                scene.ray_intersect_preliminary(ray, True),
+                scene.ray_intersect_preliminary(ray, True, active),
                 mi.Color3f(1),
                 mi.Float(0),
                 mi.Color3f(0),
                 mi.UInt32(0),
-                mi.Bool(True),
+                mi.Bool(active),
             ),
             cond=lambda *state: state[-1],
             body=step,

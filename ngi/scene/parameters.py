@@ -119,6 +119,12 @@ class Parameters:
             node = self._parameters.hierarchy[node][0]
         return node is not None
 
+    def shapes_in(self, group: mi.Object) -> int:
+        """How many shapes with parameters are part of an object."""
+        nodes = {node for _, _, node, _ in self._parameters.properties.values()}
+        shapes = [node for node in nodes if isinstance(node, mi.Shape) and node != group]
+        return sum(self.belongs_to(node, group) for node in shapes)
+
     def owner(self, key: str) -> mi.Object:
         """What a parameter belongs to."""
         owner: mi.Object = self._parameters.properties[key][2]

@@ -18,10 +18,12 @@ class Body(Protocol):
 
     key: of the parameter that says where it is
     origin: [3], of the authored to_world
+    mirrors: whether that turns left into right
     """
 
     key: str
     origin: Values
+    mirrors: bool = False
 
     def move(self, matrix: transforms.Matrix) -> None: ...
 
@@ -52,6 +54,11 @@ class Placement:
     def origin(self) -> NDArray[np.float64]:
         """[3]: the origin of the authored to_world."""
         return self._body.origin
+
+    @property
+    def mirrors(self) -> bool:
+        """Whether the authored to_world turns left into right."""
+        return self._body.mirrors
 
     def step(self, *, last: bool = False) -> Write:
         """A function that sets a matrix [4, 4] of this variable's own, in world space."""
@@ -113,6 +120,7 @@ class Transformed(Body):
         # The authored matrix holds a sphere's radius and a rectangle's size too.
         self._authored = parameters.read(key)
         self.origin = self._authored[:3, 3].copy()
+        self.mirrors = transforms.mirrors(self._authored)
 
     def move(self, matrix: Matrix) -> None:
         self._parameters.write(self.key, matrix @ self._authored)

@@ -76,6 +76,11 @@ class SceneParameters(Parameters):
         # Not every mi.Mesh is one of vertices: a rectangle has a to_world.
         if isinstance(owner, mi.Mesh) and owner.class_name() != "Rectangle":
             return Vertices(self, object_id)
+        if owner.class_name().startswith("ShapeGroup") and self.shapes_in(owner) > 1:
+            raise ValueError(
+                f"{self._file}: '{object_id}' is a group of several shapes, which do not move as "
+                "one; name the instances that show it"
+            )
         key = self.find(
             object_id,
             ("to_world", "position"),

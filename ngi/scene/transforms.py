@@ -31,6 +31,16 @@ def about(pivot: NDArray[np.float64], matrix: Matrix) -> Matrix:
     return translation(pivot) @ matrix @ translation(-pivot)
 
 
+def mirrors(matrix: Matrix) -> bool:
+    """Whether it turns left into right."""
+    return bool(np.linalg.det(matrix[:3, :3]) < 0)
+
+
+def mirroring(mirrored: bool) -> Matrix:
+    """Turns left and right of a camera's picture round where `mirrored`."""
+    return np.diag([-1.0 if mirrored else 1.0, 1.0, 1.0, 1.0])
+
+
 def look_at(
     origin: NDArray[np.float64], target: NDArray[np.float64], up: NDArray[np.float64]
 ) -> Matrix:

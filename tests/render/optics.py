@@ -1,6 +1,7 @@
 """Small scenes of mirrors and glass for the tests, and geometrical optics in closed form."""
 
 import numpy as np
+import yaml
 from PIL import Image
 
 ORIGIN = np.array([0.0, 0.0, 4.0])
@@ -18,7 +19,8 @@ def write_scene(folder, *, shapes, variables, max_depth=10, fov=20, image=None) 
             <film type="hdrfilm"><integer name="width" value="8"/>
                 <integer name="height" value="8"/><rfilter type="box"/></film></sensor>
         {shapes}</scene>""")
-    count = sum(3 if "albedo" in variable else 1 for variable in variables)
+    ranges = [yaml.safe_load(entry) for entry in variables]
+    count = sum(np.not_equal(r.get("minimum", 0), r.get("maximum", 1)).sum() for r in ranges)
     (folder / "scene.yaml").write_text(
         f"{{name: optics, scene: scene.xml, samples_per_pixel: 4, max_depth: {max_depth},\n"
         f"bounds: {{minimum: {[-SIZE] * 3}, maximum: {[SIZE] * 3}}},\n"

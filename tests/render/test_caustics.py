@@ -191,6 +191,37 @@ WITHOUT = {
 }
 
 
+@pytest.mark.parametrize("factor", [1e-7, 1e9])
+def test_however_bright_an_emitter_is(load, factor) -> None:
+    """Caustics are in proportion to it: none is cut off, and none is blurred for being dim."""
+    lit = [
+        direct(load(FLOOR + bulb + rectangle("wall", WALL, MIRROR)))
+        - direct(load(FLOOR + bulb + rectangle("wall", WALL, MIRROR), direct="traced"))
+        for bulb in (BULB, BULB.replace("6, 4, 2", ", ".join(str(factor * c) for c in (6, 4, 2))))
+    ]
+    assert lit[0].mean() > 0.01
+    np.testing.assert_allclose(lit[1] / factor, lit[0], rtol=2e-3, atol=1e-3 * lit[0].max())
+
+
+@pytest.mark.parametrize("nonlinear", [False, True])
+def test_a_coat_takes_its_share_of_the_light_that_falls_through_it(load, nonlinear) -> None:
+    """Going in, as if from straight above, and out; the base throws back some of what the coat
+    throws back to it (Burley 2015; Mitsuba's `plastic`).
+    """
+    index = 1.49
+    coated = DIFFUSE.replace('"diffuse"', '"plastic"').replace("reflectance", "diffuse_reflectance")
+    option = f'<boolean name="nonlinear" value="{str(nonlinear).lower()}"/></bsdf>'
+    shapes = FLOOR.replace(DIFFUSE, coated.replace("</bsdf>", option)) + BULB
+    shapes += rectangle("wall", WALL, MIRROR)
+    added = direct(load(shapes)) - direct(load(shapes, direct="traced"))
+    cosines = (np.arange(10_000) + 0.5) / 10_000
+    inside = (2 * cosines * fresnel(cosines, 1 / index)).mean()
+    seen_at = -rays(RESOLUTION, fov=40)[..., 2:]
+    coat = (1 - fresnel(np.array(1.0), index)) * (1 - fresnel(seen_at, index))
+    share = coat / index**2 / (1 - (ALBEDO if nonlinear else 1) * inside)
+    assert_close(added, REFLECTANCE * of_a_bulb(BULB_BEHIND) * share, mean=0.02, rms=0.1)
+
+
 def test_few_photons_blur_but_lose_no_light(load, monkeypatch) -> None:
     monkeypatch.setattr("ngi.render.caustics.PHOTONS", 2**8)
     shapes = FLOOR + BULB + rectangle("wall", WALL, MIRROR)

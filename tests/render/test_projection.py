@@ -1,12 +1,16 @@
 """Where the camera shows a point, against the positions that its own rays hit."""
 
+from pathlib import Path
+
 import pytest
 import torch
 
 from ngi.machine.backend import llvm_problem
 from ngi.render import AnalyticRenderer
 from ngi.render.mitsuba_renderer import MitsubaRenderer
-from ngi.scene import read_scene, scenes
+from ngi.scene import SceneDescription, read_scene, scenes
+from tests.render.optics import write_scene
+from tests.render.test_direct_light import BULB, FLOOR, PAINT
 
 SIZE = 16
 
@@ -15,9 +19,32 @@ SIZE = 16
 def test_what_a_pixel_sees_is_projected_into_its_middle(scene: str) -> None:
     if (problem := llvm_problem()) is not None:
         pytest.skip(problem)
-    renderer = MitsubaRenderer(
-        scene=read_scene(**scenes()[scene]), backend="llvm", buffer_samples=1
-    )
+    assert_projected(read_scene(**scenes()[scene]))
+
+
+LOOK = "{object: camera, property: look_at, minimum: [-1, -1, 3.5, -0.1, -0.1, 0], \
+maximum: [1, 1, 4.5, 0.1, 0.1, 0]}"
+SHIFT = '<float name="principal_point_offset_x" value="0.1"/>\
+<float name="principal_point_offset_y" value="-0.05"/>'
+
+
+@pytest.mark.parametrize("variable", [PAINT, LOOK])
+def test_of_a_camera_that_is_shifted_and_mirrored(tmp_path: Path, variable: str) -> None:
+    if (problem := llvm_problem()) is not None:
+        pytest.skip(problem)
+    write_scene(tmp_path, shapes=FLOOR + BULB, variables=[variable], fov=40)
+    file = tmp_path / "scene.xml"
+    words = file.read_text().replace("<lookat", '<scale x="-1"/><lookat')
+    file.write_text(words.replace('<float name="fov"', SHIFT + '<float name="fov"'))
+    renderer = assert_projected(read_scene(tmp_path))
+    straight = torch.full((renderer.dimensions,), 0.5)
+    position = renderer.image_buffers(straight, resolution=SIZE)[8]
+    x = position[:, renderer.layout.slice("position").start]
+    assert (x.diff() < 0).all(), "what is to the right lies at the left of the picture"
+
+
+def assert_projected(scene: SceneDescription) -> MitsubaRenderer:
+    renderer = MitsubaRenderer(scene=scene, backend="llvm", buffer_samples=1)
     vectors = torch.rand(2, renderer.dimensions, generator=torch.Generator().manual_seed(0))
     y, x = torch.meshgrid(*[(torch.arange(SIZE) + 0.5) / SIZE] * 2, indexing="ij")
     for v, matrix in zip(vectors, renderer.projections(vectors), strict=True):
@@ -29,6 +56,7 @@ def test_what_a_pixel_sees_is_projected_into_its_middle(scene: str) -> None:
         assert (film[hit][:, 3] > 0).all()
         found = film[hit][:, :2] / film[hit][:, 3:]
         torch.testing.assert_close(found, torch.stack([x, y], -1)[hit], atol=2e-4, rtol=0)
+    return renderer
 
 
 def test_closed_formulas_show_the_unit_square() -> None:

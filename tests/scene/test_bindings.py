@@ -277,6 +277,23 @@ def test_a_group_and_what_is_in_it_are_moved_as_one(make_scene) -> None:
     assert places == [0, 1, 2, 1]
 
 
+def test_a_group_of_several_shapes_does_not_move_as_one(load) -> None:
+    """One of them would walk away."""
+
+    def edit(root) -> None:
+        ball, group = find(root, "ball"), ElementTree.SubElement(root, "shape", type="shapegroup")
+        group.set("id", "balls")
+        second = copy.deepcopy(ball)
+        second.set("id", "second")
+        root.remove(ball)
+        group.extend([ball, second])
+        instance = ElementTree.SubElement(root, "shape", type="instance", id="shown")
+        ElementTree.SubElement(instance, "ref", id="balls")
+
+    with pytest.raises(ValueError, match=r"'balls' is a group of several shapes.*instances"):
+        load({"object": "balls", **MOVE}, edit=edit)
+
+
 def test_two_cameras_may_be_led_together(load) -> None:
     scene = load({"object": ["camera", "other"], **LOOK}, edit=second_camera)
     scene.apply(np.ones(6))

@@ -124,4 +124,9 @@ class Direction(RangedVariable):
 def _looking(scene: LoadedScene, camera: str, up: Vector) -> Write:
     """A function that places a camera by origin and target, [6]."""
     placement = scene.placement(camera, only=CAMERAS)
-    return lambda view: placement.place(transforms.look_at(view[:3], view[3:], np.array(up)))
+    as_authored = transforms.mirroring(placement.mirrors)
+
+    def write(view: Values) -> None:
+        placement.place(transforms.look_at(view[:3], view[3:], np.array(up)) @ as_authored)
+
+    return write
