@@ -119,6 +119,7 @@ def _train(config: DictConfig, run: learn.Run, *, closing: ExitStack) -> dict[st
         plain(config), steps=counters.iteration, generated_batches=counters.generated_batches
     ):
         log.warning("%s", problem)
+    run.stream.catch_up()  # a frame's time is measured, without patches being traced beside it
     run.module.to(trainer.strategy.root_device)  # Lightning has taken it back to the CPU
     for optimizer in trainer.optimizers:
         optimizer.load_state_dict(optimizer.state_dict())  # moves its state to the weights

@@ -79,6 +79,8 @@ def build_module(
     config: DictConfig, *, samples: learn.Samples, stream: learn.TrainingStream, folder: Path
 ) -> learn.IlluminationModule:
     """Network, loss and optimiser, for these samples. folder: for the guard's report."""
+    import torch
+
     from ngi import learn
 
     module = learn.IlluminationModule(
@@ -92,7 +94,9 @@ def build_module(
         averaging=instantiate(config.averaging),
     )
     if stream.sampler.needs_description:
-        module.averaged_network()  # said now, not at the first batch
+        module.averaged_network()  # what these two raise is said now, not at the first batch
+        state = torch.zeros(1, samples.dimensions + 2)
+        samples.glimpses(state, resolution=samples.patch_size)
         stream.description = learn.Description(samples=samples, answers=module.answers)
     return module
 

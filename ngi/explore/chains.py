@@ -3,7 +3,7 @@
 `ChainState` is what the next step needs and is checkpointed, `ChainInfo` is for logs only.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Self
 
 import torch
@@ -135,9 +135,12 @@ class MarkovChains:
     def init(self, state_dimensions: int) -> ChainState:
         """Chains that hold no state yet; each enters the first one it proposes.
 
-        state_dimensions: S = D + 2; raises ValueError below 2.
+        state_dimensions: S = D + 2; raises ValueError below 2, and what the first batch would
+            raise: some proposal distributions have no points for any number of chains or variables.
         """
-        return ChainState.empty(self.chains, state_dimensions)
+        state = ChainState.empty(self.chains, state_dimensions)
+        self.propose(state, torch.Generator(), batch=0)
+        return state
 
     def propose(
         self,
@@ -155,9 +158,13 @@ class MarkovChains:
         if self.proposal.starts_chains:
             return proposals
         start = torch.empty_like(state.position).uniform_(generator=generator)
-        return Proposals(
+        weight = proposals.weight
+        return replace(
+            proposals,
             position=torch.where(state.occupied[:, None], proposals.position, start),
             large_step=proposals.large_step | ~state.occupied,
+            weight=None if weight is None else weight.where(state.occupied, 1.0),
+            known=None,  # it is of the states that were not taken, too
         )
 
     def accept(

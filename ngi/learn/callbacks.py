@@ -133,7 +133,7 @@ class PeriodicEvaluation(Callback):
     @property
     def _due(self) -> int:
         """Evaluations by now; the last of them once the budget is used up."""
-        return int(self._run.budget_used * self._count)
+        return int(self._run.budget_used * self._count + 1e-9)  # 0.29 * 100 is less than 29
 
 
 def callbacks(

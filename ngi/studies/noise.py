@@ -90,6 +90,11 @@ def _states(config: DictConfig, stream: dict[str, object]) -> tuple[dict[str, Te
     from ngi.clock.counters import Counters
 
     sampler, generator = instantiate(config.sampler), torch.Generator().manual_seed(config.seed)
+    if sampler.needs_description:
+        raise ValueError(
+            "sampler: it looks at patches before they are traced, which this study does not; name "
+            "a run whose sampler does not, for example one of method=ours"
+        )
     chains = type(sampler.init(2)).from_state_dict(stream["chains"])
     counters = Counters(**stream["counters"])  # type: ignore[arg-type]
     first = counters.proposed_batches

@@ -27,10 +27,11 @@ class FixedProposal:
     position: torch.Tensor
     large_step: torch.Tensor
     starts_chains: bool = False
+    weight: torch.Tensor | None = None
 
     def propose(self, position, generator, *, batch):  # noqa: ARG002
         assert position.shape == self.position.shape
-        return Proposals(position=self.position, large_step=self.large_step)
+        return Proposals(position=self.position, large_step=self.large_step, weight=self.weight)
 
 
 @dataclass
@@ -78,6 +79,16 @@ def test_a_chain_without_a_state_makes_a_large_step() -> None:
     assert (proposals.position[[0, 2]] != 0.75).all()
     assert not torch.equal(proposals.position[0], proposals.position[2])
     assert ((proposals.position >= 0) & (proposals.position < 1)).all()
+
+
+def test_weights_of_proposals_are_kept_and_a_drawn_state_has_none() -> None:
+    none, weight = torch.zeros(3, dtype=torch.bool), torch.tensor([0.5, 2.0, 4.0])
+    proposal = FixedProposal(torch.full((3, 4), 0.75), none, weight=weight)
+    state = ChainState(
+        position=torch.zeros(3, 4), patch=torch.tensor([-1, 7, 3]), age=torch.zeros(3)
+    )
+    chains = sampler(Always(), proposal=proposal)
+    assert chains.propose(state, generator(), batch=0).weight.tolist() == [1, 2, 4]
 
 
 def test_accept_moves_the_chains_the_rule_chooses() -> None:

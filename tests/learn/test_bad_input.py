@@ -40,6 +40,14 @@ def test_an_error_of_the_command_line_ends_it(
     [
         (["resolution.start=8"], ["resolution", "8", "16", "patch"]),
         (["sampler.chains=0"], ["chains", "0"]),
+        (["sampler=sobol_quarters", "sampler.chains=6"], ["sampler.chains: 6", "multiple of 4"]),
+        (
+            [
+                *("method=cnsr", "resolution=constant", "resolution.start=16"),
+                *("sampler=predicted_from_buffers", "averaging=exponential"),
+            ],
+            ["sampler: ", "ObservationSets", "sampler=uniform"],
+        ),
         (["evaluation.count=0"], ["evaluation.count"]),
         (["run.checkpoint_steps=0"], ["run.checkpoint_steps: 0", "null"]),
         (["run.checkpoint_seconds=-1"], ["run.checkpoint_seconds: -1"]),
@@ -72,6 +80,7 @@ def test_each_error_names_its_key_and_value(
         assert word in str(raised.value)
     assert not (tmp_path / "run" / "result.json").exists()
     assert not (tmp_path / "run" / "steps.csv").exists()
+    assert not (tmp_path / "references").exists(), "it came only after references were rendered"
 
 
 def test_a_key_that_an_optimiser_names_is_not_named_again(tmp_path: Path) -> None:

@@ -5,13 +5,18 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from torch import Tensor
 
-from ngi.learn import Budget, Interruption, Outcome, PhaseClock, Run, Step, TrainingStream
+from ngi.learn import Budget, Interruption, Outcome, PhaseClock, Recorder, Run, Step, TrainingStream
 from ngi.learn.callbacks import PeriodicEvaluation
 from ngi.learn.saving import BudgetAndCheckpoint
 from ngi.learn.schedule import ConstantRate
+from ngi.render import AnalyticRenderer
 from ngi.reuse import FixedProbability
-from tests.learn.late_renderers import Manual, ManualJob
+from ngi.train import train
+from tests.learn.forked import configuration
+from tests.learn.late_renderers import Manual, ManualJob, Timer
+from tests.learn.lightning_warnings import IGNORED
 from tests.learn.small_stream import make, steps
 
 HARDLY_EVER = FixedProbability(bootstrap_batches=3, probability=1e-12)
@@ -54,6 +59,38 @@ def test_an_evaluation_waits_in_run_time_for_patches_under_way(tmp_path: Path) -
     evaluation.on_train_batch_end()
     assert seen == [True]
     assert clock.seconds["render"] == clock.run_seconds == 5
+
+
+def test_evaluations_come_at_their_steps_whatever_their_number(tmp_path: Path) -> None:
+    seen: list[int] = []
+    stream = make(tmp_path, policy=HARDLY_EVER)
+    recorder: Any = SimpleNamespace(evaluate=lambda: seen.append(stream.counters.iteration))
+    evaluation = PeriodicEvaluation(run(stream, steps=100), recorder=recorder, count=100)
+    for _ in steps(stream, 100):
+        evaluation.on_train_batch_end()
+    assert seen == list(range(1, 100)), "0.29 * 100 is less than 29"
+
+
+@IGNORED[0]
+def test_the_last_evaluation_has_the_machine_for_itself(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What a frame takes is measured in it."""
+    jobs: list[ManualJob] = []
+    seen: list[bool] = []
+
+    def start(renderer: AnalyticRenderer, states: Tensor, **of_image: int) -> ManualJob:
+        jobs.append(ManualJob(renderer.render_patches(states, **of_image), Timer()))
+        return jobs[-1]
+
+    def finish(_: Recorder) -> dict[str, Any]:
+        seen.append(all(job.finished for job in jobs))
+        return {}
+
+    monkeypatch.setattr(AnalyticRenderer, "start_patches", start)
+    monkeypatch.setattr(Recorder, "finish", finish)
+    train(configuration(tmp_path, "reuse.when_late=reuse"))
+    assert seen == [True]
 
 
 @pytest.mark.parametrize(("budget", "waits"), [(8, True), (5, False)])
