@@ -31,6 +31,9 @@ CHAIN_CHANNELS = {"throughput": 3, "chain_roughness": 1}
 DIRECT_CHANNELS = {"direct": 3}
 """Buffer of the direct light where that is traced."""
 
+LOG_RADIANCE = frozenset({"direct", "emission"})
+"""Buffers of light: they hold log1p of its radiance."""
+
 _STORED = {
     **{name: count for name, count in BUFFER_CHANNELS.items() if name != "emission"},
     **CHAIN_CHANNELS,

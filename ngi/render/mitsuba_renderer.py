@@ -12,6 +12,7 @@ import torch
 from torch import Tensor
 
 from ngi.machine.backend import activate, describe, mi
+from ngi.patches import LOG_RADIANCE
 from ngi.render.first_hit import first_hit_of
 from ngi.render.fitting import FittingTracer
 from ngi.render.needs import buffers_are_static
@@ -271,9 +272,8 @@ class MitsubaRenderer(Renderer):
 
     def _encode(self, buffers: Tensor) -> Tensor:
         """Emission and direct light become log1p of their means, in place."""
-        for name in ("direct", "emission"):
-            if name in self.layout.names:
-                buffers[..., self.layout.slice(name)].log1p_()
+        for name in LOG_RADIANCE.intersection(self.layout.names):
+            buffers[..., self.layout.slice(name)].log1p_()
         return buffers
 
 

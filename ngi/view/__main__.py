@@ -60,6 +60,7 @@ def view(options: ViewOptions) -> None:
         renderer=run.renderer,
         protocol=run.protocol,
         scene=options.scene,
+        supersampled_edges=options.supersampled_edges,
     )
     with (
         closing(run.renderer),

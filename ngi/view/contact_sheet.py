@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING
 
 import torch
@@ -10,6 +12,7 @@ from torch import Tensor
 from tqdm import tqdm
 
 from ngi.evaluate.pictures import srgb_picture
+from ngi.patches import LOG_RADIANCE
 
 if TYPE_CHECKING:
     from ngi.render.mitsuba_renderer import MitsubaRenderer
@@ -26,6 +29,7 @@ def contact_sheet(
     configurations: how many random v. resolution: pixels a side of every picture. Radiance is
     shown in sRGB; a picture darker or brighter than usual is not adapted.
     """
+    shown = partial(srgb_picture, exposure=0.0)
     generator = torch.Generator().manual_seed(0)
     random = torch.rand(configurations, renderer.dimensions, generator=generator)
     hard = renderer.hard_frames()
@@ -38,21 +42,28 @@ def contact_sheet(
                 samples_per_pixel=samples_per_pixel,
                 seed=index,
             )
-            tiles.append((f"{title} {index}", srgb_picture(image, 0.0)))
+            tiles.append((f"{title} {index}", shown(image)))
     for title, v in (("random 0", random[0]), ("hard frame 0", hard[0])):
         buffers = renderer.image_buffers(v, resolution=resolution).cpu()
         for name in renderer.layout.names:
-            picture = buffer_picture(name, buffers[..., renderer.layout.slice(name)])
+            picture = buffer_picture(name, buffers[..., renderer.layout.slice(name)], shown)
             tiles.append((f"{name}, {title}", picture))
     return _grid(tiles, resolution)
 
 
-def buffer_picture(name: str, buffer: Tensor) -> Image.Image:
-    """A buffer [H, W, 1 or 3] as colours: directions from [-1, 1], the rest from [0, 1]."""
+def buffer_picture(
+    name: str, buffer: Tensor, shown: Callable[[Tensor], Image.Image]
+) -> Image.Image:
+    """A buffer [H, W, 1 or 3] as colours: directions from [-1, 1], the rest from [0, 1].
+
+    shown: how light is, linear radiance [H, W, 3]
+    """
+    if name in LOG_RADIANCE:
+        return shown(buffer.expm1())
     if name == "outgoing":
         buffer = buffer / 2 + 0.5
     colours = buffer.clamp(0, 1).expand(*buffer.shape[:2], 3)
-    if name in ("albedo", "direct", "emission", "throughput"):
+    if name in ("albedo", "throughput"):
         return srgb_picture(colours, 0.0)
     return Image.fromarray((colours * 255).to(torch.uint8).numpy())
 

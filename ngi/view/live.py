@@ -130,6 +130,7 @@ def live_view(
         renderer=run.renderer,
         protocol=protocol,
         scene=None,
+        supersampled_edges=False,
     )
 
     def predict(buffers: Tensor, v: Tensor, *, preview: bool) -> Tensor:

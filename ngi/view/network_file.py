@@ -20,6 +20,7 @@ from ngi.models import EncodedGenerator, PixelGenerator
 from ngi.models.known_light import EMITTER_THRESHOLD
 from ngi.patches import BufferLayout
 from ngi.scene import SceneDescription
+from ngi.view.run_settings import read_settings
 from ngi.view.trained_run import TrainedRun
 
 ImageNetwork = PixelGenerator | EncodedGenerator
@@ -112,18 +113,26 @@ BUFFERS = {
     "throughput": "of the specular bounces before the surface, linear RGB; 1 where there is none",
     "chain_roughness": "sqrt of the sum of alpha^2 over these bounces",
     "direct": "log(1 + x) of the pixel's mean direct light x, linear RGB: the radiance that leaves "
-    "the surface towards the camera after one bounce from an emitter, times the throughput; "
-    "trained on one emitter sample and one BSDF sample per camera ray, combined by multiple "
-    "importance sampling; with renderer.direct=with_caustics (method=ours) also what a diffuse "
-    "surface sends of the light that mirrors and glass throw onto it",
+    "the surface along 'outgoing' after one bounce from an emitter, times the throughput where "
+    "that is a channel; trained on one emitter sample and one BSDF sample per camera ray, combined "
+    "by multiple importance sampling; ",
     "emission": "log(1 + x) of the mean emitted radiance x of the pixel, linear RGB",
 }
-"""What the channels of `BufferLayout` are."""
+AFTER_BOUNCES = {
+    "position": "world position p of the hit where the specular bounces end, see 'specular': "
+    "(p - minimum) / (maximum - minimum) of 'bounds'",
+    "outgoing": "unit vector from the surface back along the ray's last segment, world space, in "
+    "[-1, 1]: towards the mirror or glass before it, the camera where there is none",
+    "emission": "log(1 + x) of the mean emitted radiance x of the pixel, linear RGB: of every "
+    "emitter on the ray's way, the environment too, times the throughput up to it",
+}
+"""What the channels of `BufferLayout` are; in `AFTER_BOUNCES` where specular bounces are traced."""
+OTHER_BRANCH = "; and of one that a dielectric's weaker branch meets first, times its weight too"
 
 PIXELS = (
     "each channel is the mean over the 'buffer_samples' camera rays of a pixel, spread evenly over "
-    "its square; a ray that hits nothing counts as 0, "
-    "but for its throughput and the environment's emission"
+    "its square; a ray that hits nothing, at once or in the end, counts as 0, "
+    "but for its throughput, chain_roughness and emission"
 )
 RADIANCE = "linear RGB in the scene's units, as the network gives it: it may be slightly negative"
 EDGES = (
@@ -168,7 +177,7 @@ def network_metadata(run: TrainedRun, precision_differs: float) -> dict[str, str
         "commit": f"{origin['commit'] or 'unknown'}{' (changed since)' if origin['dirty'] else ''}",
         "versions": json.dumps(origin["versions"]),
         "precision": _precision(run.precision, precision_differs),
-        "buffers": json.dumps(list(_buffers(run.renderer.layout))),
+        **_buffer_metadata(run),
         "pixels": PIXELS,
         "buffer_samples": str(run.renderer.buffer_samples),
         **(
@@ -231,9 +240,61 @@ def _precision(trained: str, differs: float) -> str:
     )
 
 
-def _buffers(layout: BufferLayout) -> Iterable[dict[str, Any]]:
+def _buffer_metadata(run: TrainedRun) -> dict[str, str]:
+    """What was traced for the buffers, and what their channels are."""
+    options = read_settings(run.folder)["renderer"]
+    told = {f"renderer.{name}": options.get(name, "learned") for name in ("specular", "direct")}
+    layout, direct = run.renderer.layout, told["renderer.direct"]
+    max_depth = -1 if run.description is None else run.description.max_depth
+    meanings = dict(BUFFERS)
+    if "throughput" in layout.names:
+        told["specular"] = _specular_rule(max_depth)
+        meanings |= AFTER_BOUNCES
+        meanings["emission"] += "" if direct == "learned" else OTHER_BRANCH
+    caustics = _caustics(max_depth) if direct == "with_caustics" else "caustics are not in it"
+    meanings["direct"] += caustics
+    return {**told, "buffers": json.dumps(list(_buffers(layout, meanings)))}
+
+
+def _specular_rule(max_depth: int) -> str:
+    """How far `ngi.render.specular` follows a camera ray. max_depth: of the scene, -1: any."""
+    from ngi.render.specular import MAX_SPECULAR_BOUNCES, SPECULAR_ROUGHNESS  # brings Mitsuba
+
+    return (
+        "each camera ray is followed over specular bounces; all channels but throughput, "
+        "chain_roughness and emission are of the hit where they end, the first that is not "
+        "specular. Specular are conductors, dielectrics and thin dielectrics, smooth or of alpha "
+        f"<= {SPECULAR_ROUGHNESS:g} at the hit, which count as smooth; a conductor's back only if "
+        "it is two-sided with the same BSDF on both; none with a bump or normal map, no plastic, "
+        "no principled BSDF. At a dielectric the ray takes the stronger branch by Fresnel's "
+        "equations: reflection if its share is above 0.5, else transmission (a thin one's share "
+        "holds all reflections inside it). The throughput is the product of the weights: the "
+        "share reflected times specular_reflectance, or the rest times specular_transmittance "
+        "and, but for thin ones, (n1 / n2)^2, n1 being the index on the ray's side. The ray "
+        f"ends after {_bounces(MAX_SPECULAR_BOUNCES, max_depth, 1)}, whatever is hit then; "
+        "'direct' is 0 where no segment of the scene's max_depth is left for it"
+    )
+
+
+def _caustics(max_depth: int) -> str:
+    from ngi.render.caustics import MAX_BOUNCES
+    from ngi.render.specular import SPECULAR_ROUGHNESS
+
+    return (
+        "caustics are in it: what a diffuse surface sends of the light that conductors and "
+        f"dielectrics of alpha <= {SPECULAR_ROUGHNESS:g} throw onto it, along the stronger branch "
+        f"and over at most {_bounces(MAX_BOUNCES, max_depth, 2)}"
+    )
+
+
+def _bounces(most: int, max_depth: int, others: int) -> str:
+    fewer = f", or {max_depth - others} (max_depth - {others}) if that is fewer"
+    return f"{most} bounces{fewer if max_depth >= 0 else ''}"
+
+
+def _buffers(layout: BufferLayout, meanings: Mapping[str, str]) -> Iterable[dict[str, Any]]:
     """In order of the channels."""
     for name in layout.names:
         part = layout.slice(name)
         channels = part.stop - part.start
-        yield {"name": name, "first": part.start, "channels": channels, "meaning": BUFFERS[name]}
+        yield {"name": name, "first": part.start, "channels": channels, "meaning": meanings[name]}

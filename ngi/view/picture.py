@@ -34,11 +34,12 @@ class PictureOptions:
     """
 
     run: str = option("a run's folder, finished or not")
-    out: str = option("file to write: .png (sRGB) or .exr (linear radiance)", "picture.png")
+    out: str = option("file to write: .png or .exr (linear radiance)", "picture.png")
     v: list[float] | None = option("configuration, D numbers from 0 to 1", None)
     hard_frame: int = option("where there is no v: which of the scene's hard frames", 0)
     resolution: int = option("pixels a side", 256)
     exposure: float = option("stops, of PNG files", 0.0)
+    tone_mapping: str = option("of PNG files: sRGB, filmic or linear", "sRGB")
     reference: int = option("samples per pixel of a path-traced picture beside it, with errors", 0)
     supersampled_edges: bool = option(
         "ask the network four times a pixel at edges: less error, longer frames", False
@@ -54,12 +55,17 @@ def write_picture(options: PictureOptions) -> None:
     from PIL import Image
 
     from ngi.evaluate import Lpips, error_picture, image_metrics
+    from ngi.view.screen import CURVES
     from ngi.view.trained_run import TrainedRun
 
     out = Path(options.out)
     check_output(out, *SUFFIXES)
     if not options.resolution >= 1 or not options.reference >= 0:
         raise ValueError("resolution has to be at least 1, reference at least 0")
+    if options.tone_mapping not in CURVES:
+        raise ValueError(
+            f"tone_mapping: '{options.tone_mapping}': choose one of {', '.join(CURVES)}"
+        )
     run = TrainedRun.open(
         Path(options.run),
         scene_path=options.scene,
@@ -77,12 +83,12 @@ def write_picture(options: PictureOptions) -> None:
         begin = perf_counter()
         radiance = run.radiance(v, resolution=options.resolution)
         took = perf_counter() - begin
-        _write(out, radiance, exposure=options.exposure)
+        _write(out, radiance, options)
         print(f"step {run.step}, {1e3 * took:.0f} ms; {out}")
         if options.reference == 0:
             return
         reference = _traced(options, run.renderer, v)
-    _write(_beside(out, "reference"), reference, exposure=options.exposure)
+    _write(_beside(out, "reference"), reference, options)
     error = Image.fromarray(error_picture(radiance, reference, run.protocol.epsilon))
     error.save(_beside(out, "error").with_suffix(".png"))
     measured = image_metrics(radiance, reference, protocol=run.protocol, lpips=lpips)
@@ -115,16 +121,20 @@ def _traced(options: PictureOptions, renderer: Renderer, v: Tensor) -> Tensor:
     return picture
 
 
-def _write(path: Path, radiance: Tensor, *, exposure: float) -> None:
-    from ngi.evaluate.pictures import srgb_picture
+def _write(path: Path, radiance: Tensor, options: PictureOptions) -> None:
+    from PIL import Image
+
+    from ngi.evaluate.pictures import eight_bit
     from ngi.files.durable import write_atomically
     from ngi.render.exr import write_exr
+    from ngi.view.screen import shown
 
     if path.suffix == ".exr":
         write_exr(path, radiance)
     else:
+        toned = shown(radiance, curve=options.tone_mapping, exposure=options.exposure)
         picture = BytesIO()
-        srgb_picture(radiance, exposure).save(picture, "png")
+        Image.fromarray(eight_bit(toned)).save(picture, "png")
         write_atomically(path, picture.getvalue())
 
 

@@ -1,6 +1,6 @@
 """What can be seen of one configuration: the network's picture, the buffers, a path-traced one."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from time import perf_counter
 
@@ -49,6 +49,11 @@ class SceneView:
     _prediction: Tensor | None = None
     _total: Tensor | None = None
     _finite: Tensor | None = None
+
+    def has(self, parts: Iterable[str]) -> bool:
+        """Whether all of these are computed; parts: as `seconds` names them."""
+        computed = {"buffers": self._buffers, "network": self._prediction, "paths": self._total}
+        return all(computed[part] is not None for part in parts)
 
     @property
     def buffers(self) -> Tensor:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from PIL import Image
 from torch import Tensor
 
 from ngi.evaluate import tone_map
@@ -45,13 +46,16 @@ PARTS: dict[str, tuple[str, ...]] = {
 }
 """What can be shown beside the buffers, and the pictures side by side that it consists of."""
 
+NEEDS = {"network": {"network"}, "path tracer": {"paths"}, "error": {"network", "paths"}}
+"""Parts of a view, as `SceneView.has` names them, that each of these pictures is made from."""
+
 
 @dataclass(frozen=True)
 class Screen:
     """What to show, and how.
 
     show: a key of `PARTS`, or a buffer's name
-    curve, exposure: see `ngi.view.screen.shown`
+    curve, exposure: of light, see `ngi.view.screen.shown`; other buffers and errors have none
     epsilon: of the relative error, as in the evaluation protocol
     """
 
@@ -65,9 +69,14 @@ class Screen:
         return PARTS.get(self.show, (self.show,))
 
     @property
+    def needs(self) -> set[str]:
+        """What of a view it is made from, as `SceneView.has` names it."""
+        return set().union(*(NEEDS.get(part, {"buffers"}) for part in self.parts))
+
+    @property
     def traces_paths(self) -> bool:
         """Whether more samples per pixel would show."""
-        return bool({"path tracer", "error"} & set(self.parts))
+        return "paths" in self.needs
 
     def pixels(self, view: SceneView) -> Pixels:
         """[H, W * number of parts, 3]; pixels that are NaN or Inf in cyan."""
@@ -82,7 +91,8 @@ class Screen:
         if part in pictures:
             return pictures[part]()
         buffer = view.buffers[..., view.renderer.layout.slice(part)]
-        return np.asarray(buffer_picture(part, buffer))
+        picture = buffer_picture(part, buffer, lambda light: Image.fromarray(self._toned(light)))
+        return np.asarray(picture)
 
     def _toned(self, radiance: Tensor) -> Pixels:
         return eight_bit(shown(radiance, curve=self.curve, exposure=self.exposure))

@@ -7,7 +7,7 @@ from ngi.view.scene_view import Place, SceneView
 from ngi.view.screen import Screen
 
 SETTLED = 0.25
-"""Seconds without a change after which the full resolution is worth its time."""
+"""Seconds without a change after which the full resolution or more paths are worth their time."""
 MOST_SAMPLES = 4096
 """Samples per pixel after which a path-traced picture is left as it is."""
 
@@ -57,24 +57,26 @@ class Session:
         """What is shown is out of date: the network has changed, or the browser was lost."""
         self._shown = self._previewed = self._failed = None
 
-    def next_job(self, *, now: float, samples: int) -> Job | None:
+    def next_job(self, *, now: float, samples: int, computed: bool) -> Job | None:
         """The picture that is wanted most; None where all is shown, or the last one failed.
 
         samples: per pixel that the wish's path-traced picture has.
+        computed: whether all is there that the wish's picture is made from.
         """
         if self._failed == self._wish:
             return None
+        settled = now - self._changed >= SETTLED
         if self._shown == self._wish:
-            more = self._wish.screen.traces_paths and samples < MOST_SAMPLES
+            more = settled and self._wish.screen.traces_paths and samples < MOST_SAMPLES
             return Job(self._wish, more_paths=True) if more else None
-        if now - self._changed >= SETTLED:
+        if settled or computed:
             return Job(self._wish)
         if self._previewed == self._wish:
             return None
         return Job(replace(self._wish, place=self._preview(self._wish.place)))
 
     def seconds_until_settled(self, *, now: float) -> float:
-        """After which `next_job` asks for the full resolution."""
+        """After which `next_job` asks for the full resolution, or for more paths."""
         return max(0.0, self._changed + SETTLED - now)
 
     def done(self, job: Job) -> None:

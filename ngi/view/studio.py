@@ -154,8 +154,13 @@ class Studio:
         """The job of the browser that has waited longest; new pictures before better ones."""
         now, better = monotonic(), None
         for name, browser in self._browsers.items():
-            view = self._views.get(browser.session.wish.place)
-            job = browser.session.next_job(now=now, samples=0 if view is None else view.samples)
+            wish = browser.session.wish
+            view = self._views.get(wish.place)
+            job = browser.session.next_job(
+                now=now,
+                samples=0 if view is None else view.samples,
+                computed=view is not None and view.has(wish.screen.needs),
+            )
             if job is None:
                 continue
             turn = _Turn(name, browser, job)

@@ -73,6 +73,7 @@ class Subject:
     camera: None where v does not let it walk
     protocol: that metrics are measured by
     scene: its folder, where the run's own files do not say it
+    supersampled_edges: whether the network is asked so, though the run itself may not
     """
 
     name: str
@@ -83,6 +84,7 @@ class Subject:
     camera: Camera | None
     protocol: EvaluationProtocol
     scene: str | None
+    supersampled_edges: bool
 
     @property
     def start(self) -> Sequence[float]:
@@ -98,6 +100,7 @@ def subject(
     renderer: Renderer,
     protocol: EvaluationProtocol,
     scene: str | None,
+    supersampled_edges: bool,
 ) -> Subject:
     """description: of the scene; None for closed formulas, whose variables have no names."""
     frames = renderer.hard_frames().tolist()
@@ -112,4 +115,5 @@ def subject(
         camera=None if description is None else camera_of(description),
         protocol=protocol,
         scene=scene,
+        supersampled_edges=supersampled_edges,
     )

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass
 from os.path import relpath
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ngi.config.options import check_output, option, run_tool
 
@@ -28,11 +28,16 @@ class VideoOptions:
 
     Beside the MP4 file, a JSON file of the same name says what was measured: along a path that
     moves, the error of the changes from frame to frame (with a reference); where v stands still,
-    flicker. `ngi report` tabulates every video*.json below its folder.
+    flicker. `ngi report` tabulates every video*.json below its folder. What was measured is not
+    replaced by a video with other options: give that one another name, out=FILE.
     """
 
     run: str = option("a run's folder, finished or not; of path tracing, finished")
-    out: str | None = option("file to write; null: video_PATH.mp4 in the run's folder", None)
+    out: str | None = option(
+        "file to write; null: video_PATH.mp4 in the run's folder, with _3 for hard_frame=3 of a "
+        "static path and _supersampled for such edges",
+        None,
+    )
     path: str = option(
         "through v: camera (the scene's own), hard_frames, static, or a JSON file with a list of v",
         "camera",
@@ -74,18 +79,16 @@ def _out(options: VideoOptions) -> Path:
     if options.out is not None:
         return Path(options.out)
     frame = f"_{options.hard_frame}" if options.path == "static" and options.hard_frame else ""
-    return Path(options.run) / f"video_{Path(options.path).stem}{frame}.mp4"
+    edges = "_supersampled" if options.supersampled_edges else ""
+    return Path(options.run) / f"video_{Path(options.path).stem}{frame}{edges}.mp4"
 
 
 def _check(options: VideoOptions, *, figures: Path) -> None:
     """figures: the JSON file that is to be written"""
     if options.out is not None:
         check_output(Path(options.out), ".mp4")
-    if figures.exists() and not _is_of_a_video(figures):
-        raise ValueError(
-            f"out: {figures}, where the figures would be written, is there and no video's; "
-            "choose another name"
-        )
+    if figures.exists():
+        _check_replaced(options, figures)
     if not options.resolution >= 1 or not options.frames_per_second >= 1:
         raise ValueError("resolution and frames_per_second have to be at least 1")
     if options.reference < 0 or options.reference % 2:
@@ -94,12 +97,43 @@ def _check(options: VideoOptions, *, figures: Path) -> None:
         raise ValueError(f"seconds: {options.seconds}; a video has two frames at least")
 
 
-def _is_of_a_video(figures: Path) -> bool:
+def _check_replaced(options: VideoOptions, figures: Path) -> None:
+    """ValueError where `figures` is no video's, or holds what one of other options measured."""
     try:
-        content = json.loads(figures.read_text())
-    except ValueError:
-        return False
-    return isinstance(content, dict) and "measure" in content
+        film = json.loads(figures.read_text())
+        before, measured = _decisive(film["options"], _folders(film, figures)), film["measured"]
+        _ = film["measure"]
+    except (ValueError, KeyError, TypeError, AttributeError):
+        raise ValueError(
+            f"out: {figures}, where the figures would be written, is there and no video's; "
+            "choose another name"
+        ) from None
+    now = _decisive(asdict(options), map(Path, (options.run, *(options.beside or ()))))
+    apart = [key for key in now if before[key] != now[key]]
+    if measured and apart:
+        was, would_be = (", ".join(f"{key}={of[key]}" for key in apart) for of in (before, now))
+        raise ValueError(
+            f"out: {figures} holds what was measured with {was}, and would be replaced by a video "
+            f"with {would_be}; give this one another name with out=…, or delete that one"
+        )
+
+
+def _folders(film: dict[str, Any], figures: Path) -> list[Path]:
+    """Of the film's runs."""
+    return [figures.parent / run["folder"] for run in film["runs"]]
+
+
+def _decisive(options: dict[str, Any], folders: Iterable[Path]) -> dict[str, Any]:
+    """The options by which videos of one name may differ; what an older file lacks has its default.
+
+    folders: of `run` and `beside`, which options name as seen from wherever the command was given.
+        `scene` is named so too, and a run is shown in no other than its own.
+    """
+    run, *beside = (str(folder.resolve()) for folder in folders)
+    known = asdict(VideoOptions(run=run))
+    found = {key: options.get(key, default) for key, default in known.items()}
+    del found["out"], found["scene"]
+    return {**found, "run": run, "beside": beside}
 
 
 def _film(options: VideoOptions, stack: ExitStack) -> Film:

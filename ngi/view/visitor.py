@@ -179,8 +179,13 @@ class Visitor:
         words = [f"run={self._subject.folder}", f"v=[{v}]", f"resolution={self._panel.resolution}"]
         if self._subject.scene is not None:
             words.append(f"scene={self._subject.scene}")
-        if exposure := self._panel.screen.exposure:
-            words.append(f"exposure={exposure:g}")
+        if self._subject.supersampled_edges:
+            words.append("supersampled_edges=true")
+        screen = self._panel.screen
+        if screen.exposure:
+            words.append(f"exposure={screen.exposure:g}")
+        if screen.curve != "sRGB":
+            words.append(f"tone_mapping={screen.curve}")
         return shlex.join(["ngi", "render", *words, "out=picture.png"])
 
 

@@ -13,7 +13,11 @@ from analysis.runs import find_runs
 FLOOR = {"srgb": 0.001, "relative": 0.01, "mean_square": 2e-7}
 
 
+STILL = {"srgb": 0.0, "relative": 0.0}
+
+
 def write_film(file: Path, *runs: str, measure: str = "temporal_error", **measured: dict) -> None:
+    """As a version wrote it that said little; `change_film` adds the rest."""
     film = {
         "options": {"path": "camera", "resolution": 64},
         "scene": "mirror",
@@ -22,6 +26,16 @@ def write_film(file: Path, *runs: str, measure: str = "temporal_error", **measur
         "measure": measure,
         "measured": measured,
     }
+    file.write_text(json.dumps(film))
+
+
+def change_film(file: Path, *steps: int, scene_hash: str = "mirror-files", **options) -> None:
+    """steps: of its runs"""
+    film = json.loads(file.read_text())
+    film["scene_hash"] = scene_hash
+    film["options"] |= options
+    for run, step in zip(film["runs"], steps, strict=True):
+        run["step"] = step
     file.write_text(json.dumps(film))
 
 
@@ -41,10 +55,10 @@ def runs(make_run, tmp_path) -> Path:
     return tmp_path / "runs"
 
 
-def rows(folder: Path) -> dict[str, list[list[str]]]:
-    """By title; a star beside what is marked."""
+def rows(folder: Path, *expected: str) -> dict[str, list[list[str]]]:
+    """By title; a star beside what is marked. expected: warnings"""
     tables, warnings = film_tables(folder, name_methods(find_runs(folder)[0]))
-    assert warnings == []
+    assert warnings == list(expected)
     return {
         table.title.split(",")[0]: [[c.text + "*" * c.best for c in row] for row in table.rows]
         for table in tables
@@ -52,7 +66,7 @@ def rows(folder: Path) -> dict[str, list[list[str]]]:
 
 
 def test_the_steadiest_network_is_marked_and_the_reference_is_not(runs) -> None:
-    where = ["mirror", "camera", "24 × 64²"]
+    where = ["mirror", "camera", "24 × 64²", "–"]
     assert rows(runs) == {
         "Error of the changes from frame to frame": [
             [*where, "uniform sampling, seed 0", "0.012", "0.123*", "3e-06"],
@@ -63,10 +77,84 @@ def test_the_steadiest_network_is_marked_and_the_reference_is_not(runs) -> None:
 
 
 def test_a_film_of_one_network_marks_none_and_flicker_has_a_table_of_its_own(runs) -> None:
-    still = {"srgb": 0.0, "relative": 0.0}
-    write_film(runs / "video.json", "elsewhere", measure="flicker", network=still, traced=still)
+    write_film(runs / "video.json", "elsewhere", measure="flicker", network=STILL, traced=STILL)
     assert rows(runs)["Flicker"] == [
-        ["mirror", "camera", "24 × 64²", name, "0", "0"] for name in ("network", "traced")
+        ["mirror", "camera", "24 × 64²", "–", name, "0", "0"] for name in ("elsewhere", "traced")
+    ]
+
+
+def test_films_of_other_options_have_other_cells(make_run, tmp_path) -> None:
+    run = make_run()
+    for number, options in enumerate(
+        (
+            {"hard_frame": 0, "reference": 0},
+            {"hard_frame": 3, "reference": 0},
+            {"hard_frame": 3, "reference": 1024, "supersampled_edges": False},
+            {"hard_frame": 3, "reference": 1024, "supersampled_edges": True},
+        )
+    ):
+        file = run / f"video_{number}.json"
+        write_film(file, ".", measure="flicker", network=STILL)
+        change_film(file, 1000, path="static", **options)
+    assert [row[1:5] for row in rows(tmp_path / "runs")["Flicker"]] == [
+        ["static, hard frame 0", "24 × 64²", "–", "uniform sampling, seed 0"],
+        ["static, hard frame 3", "24 × 64²", "–", "uniform sampling, seed 0"],
+        ["static, hard frame 3", "24 × 64²", "1,024 spp", "uniform sampling, seed 0"],
+        [
+            "static, hard frame 3",
+            "24 × 64², supersampled edges",
+            "1,024 spp",
+            "uniform sampling, seed 0",
+        ],
+    ]
+
+
+def test_a_network_that_was_trained_on_since_is_left_out(runs) -> None:
+    film = runs / "mirror" / "uniform" / "seed=0" / "video_camera.json"
+    other = runs / "mirror" / "mcmc_loss_step" / "seed=0"
+    change_film(film, 1000, 500)
+    warning = f"left out: {film}: film of step 500, {other} has 1000 steps: film it again"
+    (found,) = rows(runs, warning).values()
+    # Alone, the other is no longer the steadiest of several.
+    assert [row[4:6] for row in found] == [
+        ["uniform sampling, seed 0", "0.012"],
+        ["floor", "0.001"],
+    ]
+    assert found[0][6] == "0.123"
+    change_film(film, 500, 500)
+    tables, warnings = film_tables(runs, name_methods(find_runs(runs)[0]))
+    assert tables == []
+    assert [warning.split(": ")[2] for warning in warnings] == [
+        f"film of step 500, {folder} has 1000 steps" for folder in (film.parent, other)
+    ]
+
+
+def test_a_film_of_another_version_of_the_scene_is_left_out(runs) -> None:
+    run = runs / "mirror" / "uniform" / "seed=0"
+    change_film(run / "video_camera.json", 1000, 1000, scene_hash="older files")
+    warning = f"{run} has another version of the scene: film it again"
+    assert rows(runs, f"left out: {run / 'video_camera.json'}: {warning}") == {}
+
+
+def test_a_film_that_measured_nothing_needs_no_warning(make_run, tmp_path) -> None:
+    film = make_run() / "video.json"
+    write_film(film, ".", network={})
+    content = json.loads(film.read_text())
+    film.write_text(json.dumps({**content, "measured": {}, "scene_hash": "older files"}))
+    assert rows(tmp_path / "runs") == {}
+
+
+def test_interrupted_runs_are_told_by_folder_and_step(make_run, tmp_path) -> None:
+    make_run()
+    for seed in (1, 2):
+        folder = make_run(seed=seed)
+        (folder / "result.json").unlink()
+        write_film(folder / "video_static.json", ".", measure="flicker", network=STILL)
+        change_film(folder / "video_static.json", 500)
+    runs = tmp_path / "runs"
+    tables, _ = film_tables(runs, name_methods(find_runs(runs)[0]))
+    assert [row[4].text for row in tables[0].rows] == [
+        f"mirror/uniform/seed={seed}, step 500" for seed in (1, 2)
     ]
 
 

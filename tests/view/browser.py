@@ -76,6 +76,7 @@ def subject() -> Subject:
             samples_per_pass=1, maximum_samples=2,
         ),
         scene=None,
+        supersampled_edges=False,
     )  # fmt: skip
 
 

@@ -12,9 +12,11 @@ import pytest
 import torch
 from PIL import Image
 
+from ngi.evaluate.pictures import eight_bit
 from ngi.render import AnalyticRenderer
 from ngi.render.exr import write_exr
 from ngi.view.picture import main
+from ngi.view.screen import CURVES, shown
 from tests.learn.command_line import run, run_module
 
 RUN = "run.folder=run"
@@ -87,6 +89,22 @@ def test_v_may_be_given(trained: Path) -> None:
     assert (trained / "a.exr").read_bytes() != (trained / "b.exr").read_bytes()
 
 
+@pytest.mark.parametrize("curve", CURVES)
+def test_png_files_are_as_the_viewer_shows_them(trained: Path, curve: str) -> None:
+    from ngi.machine.backend import mi
+
+    asked = (f"tone_mapping={curve}", "exposure=1", "resolution=48", "reference=4")
+    for kind in ("png", "exr"):
+        status, output = render(trained, *asked, f"out={curve}.{kind}")
+        assert status == 0, output
+    for name in (curve, f"{curve}_reference"):
+        radiance = torch.from_numpy(np.array(mi.Bitmap(str(trained / f"{name}.exr"))))
+        np.testing.assert_array_equal(
+            np.asarray(Image.open(trained / f"{name}.png")),
+            eight_bit(shown(radiance, curve=curve, exposure=1.0)),
+        )
+
+
 def test_exr_files_hold_linear_radiance(tmp_path: Path) -> None:
     from ngi.machine.backend import mi
 
@@ -110,6 +128,7 @@ def test_exr_files_hold_linear_radiance(tmp_path: Path) -> None:
         (("reference=64:",), "'reference=64:' is wrong: input should be a valid integer"),
         (("v=[0.5,",), "'v=[0.5,' is wrong: input should be a valid number"),
         (("colour=red",), "'colour' is no option"),
+        (("tone_mapping=pink",), "tone_mapping: 'pink': choose one of sRGB"),
     ],
 )
 def test_mistakes_are_named(trained: Path, options: tuple[str, ...], message: str) -> None:

@@ -20,9 +20,15 @@ def wish(v: float = 0.5, *, resolution: int = 512, show: str = "network") -> Wis
     return Wish(Place((v,), resolution), Screen(show))
 
 
-def drain(session: Anyones, *, now: float, samples: int = 0) -> list[Job]:
+def next_job(
+    session: Anyones, *, now: float, samples: int = 0, computed: bool = False
+) -> Job | None:
+    return session.next_job(now=now, samples=samples, computed=computed)
+
+
+def drain(session: Anyones, *, now: float) -> list[Job]:
     jobs = []
-    while (job := session.next_job(now=now, samples=samples)) is not None and len(jobs) < 5:
+    while (job := next_job(session, now=now)) is not None and len(jobs) < 5:
         session.done(job)
         jobs.append(job)
     return jobs
@@ -68,10 +74,22 @@ def test_one_preview_is_enough_though_finer_ones_would_be_quick_by_now() -> None
 def test_a_path_traced_picture_gets_better_until_it_is_good() -> None:
     session = Session(wish(show="network | path tracer"))
     session.done(Job(session.wish))
-    assert session.next_job(now=1, samples=8) == Job(session.wish, more_paths=True)
-    assert session.next_job(now=1, samples=MOST_SAMPLES) is None
+    assert next_job(session, now=1, samples=8) == Job(session.wish, more_paths=True)
+    assert next_job(session, now=1, samples=MOST_SAMPLES) is None
     session.change(wish(0.7, show="error"), now=2)
-    assert session.next_job(now=2, samples=8) == Job(wish(0.7, resolution=256, show="error"))
+    assert next_job(session, now=2, samples=8) == Job(wish(0.7, resolution=256, show="error"))
+
+
+def test_what_is_computed_already_is_shown_whole_at_once_and_better_once_nothing_moves() -> None:
+    session = Session(wish(show="path tracer"))
+    drain(session, now=1)
+    brighter = Wish(session.wish.place, Screen("path tracer", exposure=1.0))
+    session.change(brighter, now=2)
+    assert next_job(session, now=2, samples=8, computed=True) == Job(brighter)
+    session.done(Job(brighter))
+    assert next_job(session, now=2, samples=8, computed=True) is None
+    better = next_job(session, now=2 + SETTLED, samples=8, computed=True)
+    assert better == Job(brighter, more_paths=True)
 
 
 def test_what_is_shown_already_is_made_again_on_demand() -> None:

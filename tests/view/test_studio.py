@@ -8,11 +8,11 @@ import pytest
 import torch
 from torch import Tensor
 
-from ngi.evaluate.pictures import error_picture, srgb_picture
+from ngi.evaluate.pictures import srgb_picture
 from ngi.render import AnalyticRenderer
 from ngi.view import session
 from ngi.view.scene_view import PASS_SAMPLES, Place, SceneView
-from ngi.view.screen import CURVES, PARTS, Screen, shown
+from ngi.view.screen import Screen
 from ngi.view.session import SETTLED, Wish
 from ngi.view.studio import KEPT, Shown, Studio
 
@@ -51,18 +51,6 @@ def test_the_picture_is_the_one_computed_without_a_viewer() -> None:
     np.testing.assert_array_equal(pictures[0].pixels, srgb_picture(expected, 1.0))
     assert pictures[0].full
     assert set(pictures[0].view.seconds) == {"buffers", "network"}
-
-
-def test_side_by_side_with_the_reference_and_the_error() -> None:
-    view = SceneView(Place(V, 32), renderer(), predict)
-    v = torch.tensor(V)
-    reference = renderer().render_image(v, resolution=32, samples_per_pixel=1, seed=0)
-    pixels = Screen("network | path tracer | error", epsilon=0.01).pixels(view)
-    assert pixels.shape == (32, 96, 3)
-    np.testing.assert_array_equal(pixels[:, 32:64], srgb_picture(reference, 0.0))
-    np.testing.assert_array_equal(
-        pixels[:, 64:], error_picture(view.prediction, reference.float(), 0.01)
-    )
 
 
 def test_more_passes_make_less_noise() -> None:
@@ -145,6 +133,34 @@ def test_no_backlog_of_pictures_while_a_slider_moves(monkeypatch: pytest.MonkeyP
     assert [made.view.place.resolution for made in pictures] == [256, 64, 256]
     assert pictures[-1].view.place.v[0] == 0.98
     assert [made.full for made in pictures] == [True, False, True]
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "whole"),
+    [
+        ("network", "network", True),
+        ("network", "albedo", True),
+        ("network | path tracer", "error", True),
+        ("albedo", "network", False),
+        ("network", "path tracer", False),
+        ("path tracer", "network | path tracer", False),
+    ],
+)
+def test_another_look_at_what_is_computed_is_whole_at_once(
+    monkeypatch: pytest.MonkeyPatch, before: str, after: str, whole: bool
+) -> None:
+    monkeypatch.setattr(session, "MOVING", 0)  # as on a slow machine
+    monkeypatch.setattr(session, "SETTLED", 60)
+    pictures: list[Shown] = []
+    studio = Studio(renderer=renderer(), predict=predict)
+    place = Place(V, 128)
+    studio.open("a", Wish(place, Screen(before)), pictures.append, fail)
+    studio.work(wait=0)
+    studio.change("a", Wish(place, Screen(after, curve="filmic", exposure=1.0)))
+    assert studio.work(wait=0)
+    assert pictures[1].full == whole
+    assert (pictures[1].view is pictures[0].view) == whole
+    assert not studio.work(wait=0)  # more paths would make the next look wait
 
 
 def test_a_network_that_has_learnt_is_shown_again() -> None:
@@ -245,35 +261,6 @@ def test_only_some_views_are_kept() -> None:
         studio.open("a", Wish(Place((step / 99, 0, 0), 32), Screen()), pictures.append, fail)
         studio.work(wait=0)
     assert len(studio._views) == KEPT
-
-
-def test_every_buffer_and_part_can_be_shown() -> None:
-    view = SceneView(Place(V, 32), renderer(), predict)
-    for name in (*PARTS, *view.renderer.layout.names):
-        pixels = Screen(name).pixels(view)
-        assert pixels.dtype == np.uint8
-        assert pixels.shape == (32, 32 * len(Screen(name).parts), 3)
-
-
-def test_tone_curves() -> None:
-    radiance = torch.tensor([[[0.0, 0.18, 1.0], [4.0, -1.0, torch.nan]]])
-    linear = shown(radiance, curve="linear", exposure=1.0)
-    assert linear[0, 0].tolist() == pytest.approx([0, 0.36, 1])
-    assert linear[0, 1, :2].tolist() == [1, 0]
-    for curve in CURVES:
-        values = shown(radiance, curve=curve, exposure=0.0)
-        assert values[0, 1, 2].isnan()
-        finite = values[~values.isnan()]
-        assert ((finite >= 0) & (finite <= 1)).all()
-    # Narkowicz 2015: x (2.51 x + 0.03) / (x (2.43 x + 0.59) + 0.14), then the sRGB curve
-    x = 0.18
-    expected = (
-        1.055 * ((x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14)) ** (1 / 2.4) - 0.055
-    )
-    filmic = shown(radiance, curve="filmic", exposure=0.0)
-    assert filmic[0, 0, 1].item() == pytest.approx(expected, rel=1e-5)
-    with pytest.raises(ValueError, match="curve 'pink'"):
-        shown(radiance, curve="pink", exposure=0.0)
 
 
 def test_a_preview_asks_the_renderer_for_as_few_rays_as_its_place_says() -> None:

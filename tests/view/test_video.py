@@ -43,7 +43,9 @@ def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def video(folder: Path, monkeypatch: pytest.MonkeyPatch, *options: str) -> int:
+    """What an earlier test measured is not in the way."""
     monkeypatch.chdir(folder)
+    Path("video.json").unlink(missing_ok=True)
     fixed = ("run=run", "out=video.mp4", f"resolution={SIZE}", "frames_per_second=1")
     return main([*fixed, *options])
 
@@ -256,8 +258,9 @@ def test_another_frame_is_another_file_and_path_tracing_is_no_network(
     still = ("run=paths", "path=static", "seconds=2", "frames_per_second=1", f"resolution={SIZE}")
     for frame in (0, 3, 3):
         assert main([*still, f"hard_frame={frame}"]) == 0
+    assert main([*still, "hard_frame=3", "supersampled_edges=true"]) == 0
     files = sorted(file.name for file in (trained / "paths").glob("video_*.json"))
-    assert files == ["video_static.json", "video_static_3.json"]
+    assert files == ["video_static.json", "video_static_3.json", "video_static_3_supersampled.json"]
     for file in files:
         (run,) = json.loads((trained / "paths" / file).read_text())["runs"]
         assert run["label"] == "path tracing"

@@ -1,11 +1,16 @@
-"""`ngi view` where there is nothing to see."""
+"""`ngi view` where there is nothing to see, and what it tells the page."""
 
 import sys
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, NoReturn
 
 import pytest
 
+from ngi.render import AnalyticRenderer
 from ngi.view.__main__ import main
+from ngi.view.subject import Subject
+from ngi.view.trained_run import TrainedRun
 from tests.learn.command_line import run
 
 
@@ -34,3 +39,29 @@ def test_what_has_to_be_installed_is_named(
     monkeypatch.setitem(sys.modules, "viser", None)
     assert main(["run=any"]) == 2
     assert "ngi view needs viser: pip install -e .[viewer]" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("supersampled", [True, False])
+def test_the_page_knows_how_edges_are_shown(
+    monkeypatch: pytest.MonkeyPatch, supersampled: bool
+) -> None:
+    pytest.importorskip("viser", reason="needs pip install -e .[viewer]")
+    shown: list[Subject] = []
+
+    def page(_: object, subject: Subject, **__: object) -> NoReturn:
+        shown.append(subject)
+        raise KeyboardInterrupt
+
+    opened: Any = SimpleNamespace(
+        folder=Path("run"),
+        scene_name="plane",
+        step=0,
+        description=None,
+        renderer=AnalyticRenderer(dimensions=2, patch_size=16),
+        predict=None,
+        protocol=None,
+    )
+    monkeypatch.setattr(TrainedRun, "open", lambda *_, **__: opened)
+    monkeypatch.setattr("ngi.view.page.Page", page)
+    assert main(["run=run", f"supersampled_edges={supersampled}"]) == 130
+    assert [each.supersampled_edges for each in shown] == [supersampled]

@@ -14,8 +14,10 @@ from skimage.feature import match_template
 
 viser = pytest.importorskip("viser", reason="needs pip install -e .[viewer]")
 
+from ngi.config.options import read_options  # noqa: E402
 from ngi.render import AnalyticRenderer  # noqa: E402
 from ngi.view.page import Page  # noqa: E402
+from ngi.view.picture import PictureOptions  # noqa: E402
 from ngi.view.scene_view import Place, SceneView  # noqa: E402
 from ngi.view.screen import Screen  # noqa: E402
 from ngi.view.session import Wish  # noqa: E402
@@ -103,14 +105,22 @@ def press(made: Visitor, label: str) -> None:
 
 
 def test_the_command_makes_what_is_seen(browser: Browser) -> None:
-    about = replace(subject(), scene="their scene")
+    assert set(shlex.split(visitor(browser)._command_line())[4:]) == {
+        "resolution=64", "out=picture.png",
+    }  # fmt: skip
+    about = replace(subject(), scene="their scene", supersampled_edges=True)
     made = Visitor(browser, about, studio(), resolution=64)  # type: ignore[arg-type]
     made._panel._exposure.value = 1.5
+    made._panel._curve.value = "filmic"
     words = shlex.split(made._command_line())
     assert words[:3] == ["ngi", "render", "run=run"]
     assert set(words[4:]) == {
-        "resolution=64", "scene=their scene", "exposure=1.5", "out=picture.png",
+        "resolution=64", "scene=their scene", "exposure=1.5", "tone_mapping=filmic",
+        "supersampled_edges=true", "out=picture.png",
     }  # fmt: skip
+    options = read_options(PictureOptions, "ngi render", words[2:])
+    assert options.v == pytest.approx(START)
+    assert options.supersampled_edges
 
 
 def test_what_it_says_takes_the_same_room_and_is_no_markup(browser: Browser) -> None:
