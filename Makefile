@@ -47,7 +47,8 @@ browser:
 
 report: setup ## all sweeps at BUDGET=smoke|small|paper: runs what is missing, builds the report
 	@failed=0; for sweep in $(SWEEPS); do \
-	$(BIN)/ngi costs -m +sweeps=$$sweep budget=$(BUDGET) $(OPTIONS) hydra/launcher=basic && \
+	$(BIN)/ngi costs -m +sweeps=$$sweep budget=$(BUDGET) hydra/launcher=basic \
+	$(filter-out hydra/launcher=% hydra.launcher.%,$(OPTIONS)) && \
 	$(BIN)/python -m ngi.train -m +sweeps=$$sweep budget=$(BUDGET) budget.clock=model $(OPTIONS) \
 	|| failed=1; done; \
 	$(BIN)/python -m analysis.report outputs/$(BUDGET)-model-clock && exit $$failed

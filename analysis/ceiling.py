@@ -12,7 +12,13 @@ import pandas as pd
 
 from analysis.command import errors_in_a_line
 from analysis.runs import METRICS, SETS
-from analysis.statistics import Estimate, mean_of_shared, paired_difference, shared_columns
+from analysis.statistics import (
+    Estimate,
+    difference_over_scenes,
+    mean_of_shared,
+    paired_difference,
+    shared_columns,
+)
 from analysis.tables import MISSING, Cell, Table, format_percent, to_markdown
 
 RUN = ["scene", "patches", "steps", "choice", "seed"]
@@ -34,7 +40,7 @@ NO_CHOICE = "all patches"
 """Uniform choice of the whole pool: what no unbiased choice of fewer patches can go beyond."""
 
 EVERYWHERE = "all of them"
-"""The scenes together: every scene's every seed is one pair."""
+"""The scenes together, each with the mean over its seeds for its one value."""
 
 
 def read_runs(folder: Path) -> pd.DataFrame:
@@ -78,16 +84,17 @@ def differences(runs: pd.DataFrame) -> pd.DataFrame:
 
     Columns: these, uniform (mean error of uniform choice), difference (relative, of the choice to
     uniform choice, mean over the seeds that both have), half_width (of its 95 % interval, NaN for
-    one seed) and seeds. Where there are several scenes, `EVERYWHERE` stands for all. Runs on as
-    many patches as only uniform choice was made of, which is all of the pool, are the choice
-    `NO_CHOICE` for every other number.
+    one seed) and n, of seeds. Where there are several scenes, `EVERYWHERE` stands for all, whose n
+    is that of scenes. Runs on as many patches as only uniform choice was made of, which is all of
+    the pool, are the choice `NO_CHOICE` for every other number.
     """
     rows = []
-    runs = runs.assign(pair=runs.groupby(["scene", "seed"]).ngroup())
+    runs = runs.assign(pair=pd.MultiIndex.from_frame(runs[["scene", "seed"]]).to_flat_index())
     errors = [error for error in ERRORS if error in runs]
     everywhere = runs.assign(scene=EVERYWHERE)
     both = pd.concat([runs, everywhere]) if runs["scene"].nunique() > 1 else runs
     for (scene, steps), of_steps in both.groupby(["scene", "steps"], sort=False):
+        difference = difference_over_scenes if scene == EVERYWHERE else paired_difference
         compared = set(of_steps.loc[of_steps["choice"] != BASELINE, "patches"])
         everything = of_steps[~of_steps["patches"].isin(compared)].assign(choice=NO_CHOICE)
         for patches in sorted(compared):
@@ -95,7 +102,7 @@ def differences(runs: pd.DataFrame) -> pd.DataFrame:
             for choice in [c for c in here["choice"].unique() if c != BASELINE]:
                 for error in errors:
                     uniform = _by_pair(here, BASELINE, error)
-                    found = paired_difference(uniform, _by_pair(here, choice, error))
+                    found = difference(uniform, _by_pair(here, choice, error))
                     if found is None:
                         continue
                     rows.append(
@@ -108,7 +115,7 @@ def differences(runs: pd.DataFrame) -> pd.DataFrame:
                             "uniform": sum(uniform.values()) / len(uniform),
                             "difference": found.mean,
                             "half_width": found.half_width,
-                            "seeds": found.n,
+                            "n": found.n,
                         }
                     )
     return pd.DataFrame(rows)
@@ -144,7 +151,7 @@ def concentration(runs: pd.DataFrame) -> Table:
     return Table("How concentrated the error is", columns, tuple(rows), 1)
 
 
-def _by_pair(runs: pd.DataFrame, choice: str, error: str) -> dict[int, float]:
+def _by_pair(runs: pd.DataFrame, choice: str, error: str) -> dict[tuple[str, int], float]:
     chosen = runs[runs["choice"] == choice].dropna(subset=[error])
     return dict(zip(chosen["pair"], chosen[error], strict=True))
 
@@ -153,7 +160,7 @@ def _text(row: dict[Hashable, Any] | None) -> str:
     if row is None:
         return MISSING
     half_width = None if pd.isna(row["half_width"]) else row["half_width"]
-    found = Estimate(row["difference"], half_width, int(row["seeds"]))
+    found = Estimate(row["difference"], half_width, int(row["n"]))
     return f"{format_percent(found)} ({found.n})"
 
 

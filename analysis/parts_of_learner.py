@@ -13,7 +13,12 @@ import pandas as pd
 
 from analysis.readme_table import markdown_row
 from analysis.runs import METRICS, Run
-from analysis.statistics import Estimate, mean_of_shared, paired_difference
+from analysis.statistics import (
+    Estimate,
+    difference_over_scenes,
+    mean_of_shared,
+    paired_difference,
+)
 from analysis.tables import format_percent
 
 ABLATIONS = {  # of a whole method: prefix of its runs, caption
@@ -88,12 +93,18 @@ def effects(errors: pd.DataFrame) -> pd.Series:
 
 
 def effect(errors: pd.DataFrame, part: str) -> Estimate | None:
-    """Relative difference of a part to the whole method, the mean over scenes and seeds.
+    """Relative difference of a part to the whole method, the mean over scenes.
 
-    errors: as from `errors_by_part`, all or some of its columns. Every scene's every seed is one
-    pair, and the interval that of their mean. None where there is no run of the part.
+    errors: as from `errors_by_part`. A scene's value is the mean over its seeds, paired. None where
+    there is no run of the part.
     """
-    return paired_difference(errors.loc[""].to_dict(), errors.loc[part].dropna().to_dict())
+    return difference_over_scenes(errors.loc[""].to_dict(), errors.loc[part].dropna().to_dict())
+
+
+def effect_on(scene: str, errors: pd.DataFrame, part: str) -> Estimate | None:
+    """The same on one scene, the mean over its seeds."""
+    of_scene = errors[scene]
+    return paired_difference(of_scene.loc[""].to_dict(), of_scene.loc[part].dropna().to_dict())
 
 
 def parts_table(results: pd.DataFrame) -> str:
@@ -109,16 +120,16 @@ def _table(errors: pd.DataFrame, whole: str) -> str:
     heads = [ABLATIONS[whole][1], *scenes, "all of them"]
     lines = [markdown_row(heads), markdown_row([":--", *["--:"] * (len(heads) - 1)])]
     for part in errors.index:
-        here = [errors[[scene]] for scene in scenes]
+        means = {scene: errors.loc[part, scene].mean() for scene in scenes}
         if part == "":
-            cells = [f"**{of_scene.loc[part].mean():.4f}**" for of_scene in here]
+            cells = [f"**{mean:.4f}**" for mean in means.values()]
             lines.append(markdown_row(["*nothing*", *cells, ""]))
             continue
         cells = [
-            f"{of_scene.loc[part].mean():.4f} ({format_percent(found, 0)})"
-            if (found := effect(of_scene, part))
+            f"{mean:.4f} ({format_percent(found, 0)})"
+            if (found := effect_on(scene, errors, part))
             else ""
-            for of_scene in here
+            for scene, mean in means.items()
         ]
         overall = format_percent(effect(errors, part), 0)
         lines.append(markdown_row([title(part), *cells, overall]))

@@ -70,7 +70,7 @@ def _numbers(result: dict[str, Any]) -> Iterator[tuple[str, Any]]:
         for part in FRAME_PARTS:
             yield f"frame.milliseconds.{part}", result["frame"]["milliseconds"][part]
     if "frame_seconds" in result:
-        for part in ("inputs", "network"):
+        for part in ("buffers", "inputs", "network"):
             yield f"frame_seconds.{part}", result["frame_seconds"][part]
     for set_name in SETS:
         for metric in METRICS:

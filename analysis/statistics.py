@@ -48,10 +48,22 @@ def paired_difference(baseline: Mapping[Any, float], other: Mapping[Any, float])
     Maps a seed, or scene and seed, to its value. Pairing takes out what the seed alone does to
     both. None where no seed is shared, a mean of NaN where a baseline is 0.
     """
-    seeds = sorted(baseline.keys() & other.keys())
-    if not seeds:
-        return None
-    return estimate([_relative_difference(baseline[seed], other[seed]) for seed in seeds])
+    differences = _relative_differences(baseline, other)
+    return estimate([*differences.values()]) if differences else None
+
+
+def difference_over_scenes(
+    baseline: Mapping[Any, float], other: Mapping[Any, float]
+) -> Estimate | None:
+    """The same over scenes, each with the mean over its seeds for its one value.
+
+    Maps scene and seed to its value. Seeds of one scene are no draws of scenes: the scatter between
+    the scenes' means holds that of the seeds within them, and is all that tells of other scenes.
+    """
+    by_scene: dict[str, list[float]] = {}
+    for (scene, _), difference in _relative_differences(baseline, other).items():
+        by_scene.setdefault(scene, []).append(difference)
+    return estimate([sum(of) / len(of) for of in by_scene.values()]) if by_scene else None
 
 
 def shared_columns(metrics: pd.DataFrame) -> pd.DataFrame:
@@ -66,8 +78,14 @@ def mean_of_shared(metrics: pd.DataFrame) -> pd.Series:
     return mean
 
 
-def _relative_difference(baseline: float, other: float) -> float:
-    return math.nan if baseline == 0 else (other - baseline) / baseline
+def _relative_differences(
+    baseline: Mapping[Any, float], other: Mapping[Any, float]
+) -> dict[Any, float]:
+    """Of what both have, in order."""
+    return {
+        key: (other[key] - baseline[key]) / baseline[key] if baseline[key] else math.nan
+        for key in sorted(baseline.keys() & other.keys())
+    }
 
 
 def bootstrap_interval(
@@ -80,14 +98,9 @@ def bootstrap_interval(
     seeds and test frames, has the means per seed and the means per frame. They are resampled
     independently (the crossed, two-level bootstrap) and the deviations from the means add up.
 
-    With three seeds the percentile bootstrap covers 75 % instead of 95 %: a resample's spread is
-    too small by √((n-1)/n), and the normal quantile behind it too small for few values. As in
-    Hesterberg, "What Teachers Should Know About the Bootstrap" (2015, Sec. 4.3), deviations are
-    enlarged by √(n/(n-1)), and the quantiles by t/z, with the degrees of freedom of Welch and
-    Satterthwaite over the levels. (His expanded percentiles do the latter by farther quantiles,
-    which do not exist among the ten different resamples of three values.) Noise that belongs to
-    neither seed nor frame counts in both levels, so that the interval is then too wide, not too
-    narrow. tests/analysis/test_statistics.py measures the coverage.
+    It is an `expanded_interval`, with the degrees of freedom of Welch and Satterthwaite over the
+    levels. Noise that belongs to neither seed nor frame counts in both levels, so that the interval
+    is then too wide, not too narrow. tests/analysis/test_statistics.py measures the coverage.
 
     The resampling has a fixed seed: the same values give the same interval.
     """
@@ -98,14 +111,37 @@ def bootstrap_interval(
         variance**2 / (len(values) - 1) for variance, values in zip(variances, levels, strict=True)
     )
     generator = np.random.default_rng(0)
-    deviations = np.zeros(resamples)
+    deviations = []
     for values in levels:
         n = len(values)
         means = values[generator.integers(n, size=(resamples, n))].mean(axis=1)
-        deviations += math.sqrt(n / (n - 1)) * (means - values.mean())
+        deviations.append((n, means - values.mean()))
+    return expanded_interval(centre, deviations, degrees, confidence=confidence)
+
+
+def expanded_interval(
+    centre: float,
+    deviations: Sequence[tuple[int, np.ndarray]],
+    degrees: float,
+    *,
+    confidence: float = LEVEL,
+) -> tuple[float, float]:
+    """Interval of `centre` from a bootstrap's deviations, with the width that few values lack.
+
+    deviations: per level the number n > 1 of its values, and [resamples] by how much a resample of
+    them is off `centre`; those of all levels add up
+    degrees: of freedom
+
+    With three values the percentile bootstrap covers 75 % instead of 95 %: a resample's spread is
+    too small by √((n-1)/n), and the normal quantile behind it too small for few values. As in
+    Hesterberg, "What Teachers Should Know About the Bootstrap" (2015, Sec. 4.3), deviations are
+    enlarged by √(n/(n-1)), and the quantiles by t/z. (His expanded percentiles do the latter by
+    farther quantiles, which do not exist among the ten different resamples of three values.)
+    """
+    enlarged = sum(math.sqrt(n / (n - 1)) * of_level for n, of_level in deviations)
     tail = 0.5 - confidence / 2
     stretch = scipy.stats.t.ppf(tail, degrees) / scipy.stats.norm.ppf(tail)
-    low, high = centre + stretch * np.quantile(deviations, [tail, 1 - tail])
+    low, high = centre + stretch * np.quantile(enlarged, [tail, 1 - tail])
     return float(low), float(high)
 
 

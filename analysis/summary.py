@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import pandas as pd
 
@@ -16,7 +17,7 @@ REFERENCE_NOISE = "reference noise"
 
 COSTS = ("steps", "patches_traced", "paths_traced", "run_seconds")
 FRAME_COST = "frame_ms"
-"""Milliseconds of a test frame: what has to be rendered for the network beside the buffers, as the
+"""Milliseconds of a test frame: buffers, what else has to be rendered for the network, as the
 observations of CNSR, and the network; runs of earlier versions do not know it."""
 
 
@@ -62,11 +63,17 @@ def _values(runs: Sequence[Run]) -> dict[str, Estimate | None]:
                 values[f"{set_name}_{metric}{suffix}"] = estimate(numbers) if complete else None
     for cost in COSTS:
         values[cost] = estimate([float(run.result[cost]) for run in runs])
-    frames = [run.result["frame_seconds"] for run in runs if "frame_seconds" in run.result]
-    seconds = [frame["inputs"] + frame["network"] for frame in frames]
-    known = len(frames) == len(runs)
+    seconds = [_frame_seconds(run.result) for run in runs if "frame_seconds" in run.result]
+    known = len(seconds) == len(runs)
     values[FRAME_COST] = estimate([1e3 * second for second in seconds]) if known else None
     return values
+
+
+def _frame_seconds(result: dict[str, Any]) -> float:
+    """Buffers are rendered for every evaluation; path tracing without a denoiser wants none."""
+    plan = result["config"].get("path_tracing")
+    unused = ("buffers",) if plan is not None and plan.get("denoiser") is None else ()
+    return float(sum(s for part, s in result["frame_seconds"].items() if part not in unused))
 
 
 def _reference_noise(runs: Sequence[Run]) -> Summary:

@@ -67,7 +67,7 @@ def worst_table(summaries: Sequence[Summary], sets: Sequence[str] = SETS) -> Tab
 
 
 def cost_table(summaries: Sequence[Summary]) -> Table:
-    """What the runs took, and what a test frame takes beside its buffers; means over seeds."""
+    """What the runs took, and what a test frame takes; means over seeds."""
     methods = [summary for summary in summaries if summary.is_method]
     return _table("Cost", methods, COST_TITLES, lambda value: f"{value.mean:,.0f}", mark_best=False)
 

@@ -19,7 +19,9 @@ from analysis.speedup import log_error_series
 
 runs = find_runs(Path(sys.argv[1] if len(sys.argv) > 1 else "outputs/demo"))[0]
 scenes = sys.argv[2:] or sorted({run.scene for run in runs})
-methods = sorted({run.label.get("method", "uniform") for run in runs} - {"uniform"})
+methods = sorted({run.label.get("method") or "uniform" for run in runs} - {"uniform"})
+if not methods:
+    print("nothing to compare with uniform sampling: no run has another method=…")
 
 
 # %% Two runs

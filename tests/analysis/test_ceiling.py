@@ -101,11 +101,14 @@ def test_runs_of_two_studies_are_not_mixed(tmp_path: Path) -> None:
     assert len(read_runs(tmp_path / "a")) == 1
 
 
-def test_all_scenes_together_have_a_pair_per_scene_and_seed(tmp_path: Path) -> None:
+def test_of_all_scenes_together_each_is_one_value(tmp_path: Path) -> None:
     study(tmp_path)
     found = differences(read_runs(tmp_path))
     row = only(found, scene=EVERYWHERE, choice="oracle", error="hard_error")
-    assert (row["difference"], row["seeds"]) == (pytest.approx((-0.1 - 0.2 + 0.1) / 3), 3)
+    by_scene = [(-0.1 - 0.2) / 2, 0.1]
+    assert (row["difference"], row["n"]) == (pytest.approx(np.mean(by_scene)), 2)
+    spread = stats.ttest_1samp(by_scene, 0).confidence_interval()
+    assert row["half_width"] == pytest.approx((spread.high - spread.low) / 2)
 
 
 def test_relmse_is_compared_where_it_was_measured(tmp_path: Path) -> None:
@@ -119,7 +122,7 @@ def test_relmse_is_compared_where_it_was_measured(tmp_path: Path) -> None:
     found = differences(read_runs(tmp_path))
     row = only(found, scene="room", choice="oracle", error="hard_relmse")
     assert row["difference"] == pytest.approx((0.9**2 + 0.8**2) / 2 - 1)
-    assert only(found, scene=EVERYWHERE, choice="oracle", error="hard_relmse")["seeds"] == 2
+    assert only(found, scene=EVERYWHERE, choice="oracle", error="hard_relmse")["n"] == 1
     assert main([str(tmp_path)]) == 0
     assert "noise-free relMSE, hard frames" in (tmp_path / "tables.md").read_text()
 
@@ -137,7 +140,7 @@ def test_how_concentrated_the_error_is_after_uniform_choice(tmp_path: Path) -> N
 def test_a_study_that_is_not_finished_is_read_as_far_as_it_is(tmp_path: Path) -> None:
     study(tmp_path)
     row = only(differences(read_runs(tmp_path)), scene="egg", error="hard_error")
-    assert (row["choice"], row["seeds"]) == ("oracle", 1)
+    assert (row["choice"], row["n"]) == ("oracle", 1)
     assert row["difference"] == pytest.approx(0.1)
     assert pd.isna(row["half_width"])
 

@@ -96,14 +96,7 @@ def test_a_folder_without_runs_is_an_error(tmp_path) -> None:
 
 
 def test_the_example_answers_its_questions(folder) -> None:
-    answer = subprocess.run(
-        [sys.executable, "-W", "error", "-m", "analysis.examples.questions", str(folder)],
-        capture_output=True,
-        text=True,
-        cwd=REPOSITORY,
-    )
-    assert answer.returncode == 0, answer.stderr
-    errors, seconds, hardest = answer.stdout.split("\n\n")[-3:]
+    errors, seconds, hardest = answers(folder).split("\n\n")[-3:]
     results = load_runs(folder)
     ends = {
         method: [r.history["hard_mape"].iloc[-1] for r in results.found if r.method == method]
@@ -118,6 +111,30 @@ def test_the_example_answers_its_questions(folder) -> None:
     top = {str(frame) for frame in best.nlargest(3).index}
     rows = [line.split() for line in hardest.splitlines() if line.endswith("active_exploration")]
     assert {row[-4] for row in rows} == top
+
+
+def test_path_tracing_does_not_set_the_time_that_methods_are_compared_at(folder, make_run) -> None:
+    """It takes no training; all others would be compared by their first evaluation."""
+    without = answers(folder)
+    file = make_run(method="path_tracing") / "metrics.csv"
+    pd.read_csv(file).tail(1).assign(run_seconds=0.0).to_csv(file, index=False)
+    traced = [line for line in answers(folder).splitlines() if "path_tracing" in line]
+    errors, rest = answers(folder).split("\n\n")[-3:-1], without.split("\n\n")[-3:-1]
+    assert traced
+    for found, expected in zip(errors, rest, strict=True):
+        kept = [line.split() for line in found.splitlines() if "path_tracing" not in line]
+        assert kept == [line.split() for line in expected.splitlines()]
+
+
+def answers(folder: Path) -> str:
+    answer = subprocess.run(
+        [sys.executable, "-W", "error", "-m", "analysis.examples.questions", str(folder)],
+        capture_output=True,
+        text=True,
+        cwd=REPOSITORY,
+    )
+    assert answer.returncode == 0, answer.stderr
+    return answer.stdout
 
 
 def test_importing_the_library_loads_nothing_heavy() -> None:

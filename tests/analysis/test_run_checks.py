@@ -119,8 +119,8 @@ def of_before_checksums(folder: Path) -> None:
             "no 'milliseconds'",
         ),
         (
-            replace_in("result.json", '"logs": {', '"frame_seconds": {"inputs": null}, "logs": {'),
-            "frame_seconds.inputs is 'None'",
+            replace_in("result.json", '"logs": {', '"frame_seconds": {"buffers": null}, "logs": {'),
+            "frame_seconds.buffers is 'None'",
         ),
         (replace_in("result.json", '"seconds": {', '"minutes": {'), "no 'seconds'"),
         (replace_in("result.json", '"patches_traced": ', '"patches_traced": "x", "p": '), "is 'x'"),

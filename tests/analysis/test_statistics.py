@@ -6,6 +6,7 @@ from scipy import stats
 
 from analysis.statistics import (
     bootstrap_interval,
+    difference_over_scenes,
     estimate,
     hedges_g,
     paired_difference,
@@ -58,6 +59,22 @@ def test_pairs_are_made_by_seed() -> None:
     assert (result.n, result.mean) == (3, pytest.approx(-0.1))
     assert result.half_width == pytest.approx(0.0, abs=1e-12)
     assert paired_difference({0: 1.0}, {1: 1.0}) is None
+
+
+def test_seeds_of_a_scene_are_one_draw_of_scenes() -> None:
+    """Two scenes, whose many seeds agree, tell what the mean over scenes is to ± 127 %."""
+    errors = {("box", 0): 0.9, ("box", 1): 1.9, ("box", 2): 2.6, ("hall", 0): 1.3, ("hall", 7): 1.0}
+    baseline = {("box", 0): 1.0, ("box", 1): 2.0, ("box", 2): 3.0, ("hall", 0): 1.0}
+    result = difference_over_scenes(baseline, errors)
+    by_scene = [-(0.1 + 0.05 + 0.4 / 3) / 3, 0.3]
+    assert result is not None
+    assert (result.n, result.mean) == (2, pytest.approx(np.mean(by_scene)))
+    interval = stats.ttest_1samp(by_scene, 0).confidence_interval()
+    assert result.half_width == pytest.approx((interval.high - interval.low) / 2)
+    alone = difference_over_scenes({("box", 0): 1.0, ("box", 1): 2.0}, errors)
+    assert alone is not None
+    assert (alone.n, alone.half_width) == (1, None)
+    assert difference_over_scenes(baseline, {("hall", 7): 1.0}) is None
 
 
 def coverage(seeds: int, spreads: tuple[float, float, float], trials: int = 500) -> float:

@@ -117,7 +117,18 @@ def test_costs_tell_what_a_frame_takes_where_runs_know_it(make_run, tmp_path) ->
     table = cost_table(summarise(name_methods(find_runs(tmp_path)[0])))
     assert table.columns[-1] == "ms per frame"
     found = {row[1].text: row[-1].text for row in table.rows}
-    assert found == {"uniform sampling": "–", "mcmc_loss_step": "262"}
+    assert found == {"uniform sampling": "–", "mcmc_loss_step": "762"}
+
+
+def test_path_tracing_alone_needs_no_buffers(make_run, tmp_path) -> None:
+    seconds = {"buffers": 0.5, "inputs": 0.25, "network": 0.012}
+    for sampler, denoiser in (("plain", None), ("denoised", {"_target_": "Denoiser"})):
+        file = make_run(sampler=sampler) / "result.json"
+        result = json.loads(file.read_text())
+        result["config"]["path_tracing"] = {"denoiser": denoiser}
+        file.write_text(json.dumps({**result, "frame_seconds": seconds}))
+    rows = cost_table(summarise(name_methods(find_runs(tmp_path)[0]))).rows
+    assert {row[1].text: row[-1].text for row in rows} == {"plain": "262", "denoised": "762"}
 
 
 @pytest.mark.parametrize("first", [True, False])

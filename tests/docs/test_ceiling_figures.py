@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 
 from analysis.ceiling import EVERYWHERE, NO_CHOICE, differences
-from analysis.statistics import Estimate, paired_difference
+from analysis.statistics import Estimate, difference_over_scenes, paired_difference
 from tests.docs.pages import ROOT
 from tests.docs.test_figures import geometric_mean, said
 
@@ -62,10 +62,8 @@ def of_dear_patches() -> pd.DataFrame:
 
 def by_oracle_of_dear_patches(patches: int, steps: int) -> Estimate:
     """The mean over scenes of each one's mean over all of its seeds, hard frames."""
-    error = of_dear_patches()["hard_error"]
-    ratio = error.xs("oracle", level="choice") / error.xs("uniform", level="choice")
-    by_scene = ratio.xs((patches, steps), level=("patches", "steps")).groupby("scene").mean()
-    return difference_of(0 * by_scene + 1, by_scene)
+    error = of_dear_patches()["hard_error"].xs((patches, steps), level=("patches", "steps"))
+    return over_scenes(error.xs("uniform", level="choice"), error.xs("oracle", level="choice"))
 
 
 def test_what_an_oracle_takes_off_dear_patches_is_what_the_runs_say() -> None:
@@ -84,9 +82,15 @@ def test_what_an_oracle_takes_off_dear_patches_is_what_the_runs_say() -> None:
         everything, half = error["uniform", 1024, 1600], error["uniform", 256, 1600]
         assert row[4] == as_shown(difference_of(half, everything)).split(" ")[0]
 
-    means = rows_of(page, "What an oracle takes off")[9]
+    means, *of_three = rows_of(page, "What an oracle takes off")[9:13]
     for cell, size in zip(means[1:3], sizes[:2], strict=True):
         assert cell == as_shown(by_oracle_of_dear_patches(*size)).split(" %")[0]
+    found = differences(pd.read_csv(ROOT / "docs/exploration-ceiling/scarce_ceiling.csv"))
+    of_all = found[found["scene"] == EVERYWHERE].set_index(["error", "patches", "choice"])
+    for row, error in zip(of_three, ("hard_error", "uniform_error", "hard_tail"), strict=True):
+        columns = [(size[0], "oracle") for size in sizes]
+        for cell, column in zip(row[1:], [*columns, (256, NO_CHOICE)], strict=True):
+            assert cell == as_shown(estimate_of(of_all.loc[(error, *column)])).split(" %")[0]
 
     shown = rows_of(page, "What comes near to it on bathroom")[2:]
     oracle = by_oracle_of_dear_patches(256, 1600)
@@ -167,6 +171,18 @@ def difference_of(base: pd.Series, other: pd.Series) -> Estimate:
     return difference
 
 
+def over_scenes(base: pd.Series, other: pd.Series) -> Estimate:
+    """The same, of which every scene is one value; indexed by scene and seed."""
+    difference = difference_over_scenes(base.to_dict(), other.to_dict())
+    assert difference is not None
+    return difference
+
+
+def estimate_of(row: pd.Series) -> Estimate:
+    """Of a row of `differences`."""
+    return Estimate(row["difference"], row["half_width"], row["n"])
+
+
 def tenths(change: float) -> str:
     return f"{100 * change:+.1f}".replace("-", "−")
 
@@ -179,6 +195,73 @@ def as_shown(difference: Estimate) -> str:
     return text.replace("-", "−")
 
 
+def in_words(difference: Estimate, sign: str = "") -> str:
+    """'1.2 % ± 2.3', as sentences have it."""
+    assert difference.half_width is not None
+    return f"{100 * abs(difference.mean):{sign}.1f} % ± {100 * difference.half_width:.1f}"
+
+
+def test_what_the_scenes_together_say_is_what_is_said_of_them() -> None:
+    found = pd.read_csv(ROOT / "docs/exploration-ceiling/differences.csv")
+    found = found[found["scene"] == EVERYWHERE].set_index(["steps", "choice", "error"])
+    page = "docs/exploration-ceiling/README.md"
+    number = r"(\d+\.\d % ± \d+\.\d)"
+    for pattern, *rows in (
+        (
+            rf"seven scenes the oracle takes {number} off hard frames and {number} off uniform",
+            (1600, "oracle", "hard_error"),
+            (1600, "oracle", "uniform_error"),
+        ),
+        (
+            rf"four times as many patches at once take {number} and {number} off",
+            (1600, NO_CHOICE, "hard_error"),
+            (1600, NO_CHOICE, "uniform_error"),
+        ),
+        (rf"draws the oracle takes {number} off:", (1600, "oracle_weighted", "hard_error")),
+        (
+            rf"all patches take {number} off and the oracle {number}\.",
+            (400, NO_CHOICE, "hard_error"),
+            (400, "oracle", "hard_error"),
+        ),
+        (
+            rf"have {number} less error after 1,600 steps, {number} after 400",
+            (1600, "oracle", "hard_tail"),
+            (400, "oracle", "hard_tail"),
+        ),
+    ):
+        assert said(page, pattern) == tuple(in_words(estimate_of(found.loc[row])) for row in rows)
+    for other, pattern in (
+        ("docs/exploration-ceiling/from-buffers.md", rf"took \[{number} off hard frames\]"),
+        ("docs/guide/sampler.md", rf"worth choosing on those scenes \({number} on hard frames"),
+    ):
+        (shown,) = said(other, pattern)
+        assert shown == in_words(estimate_of(found.loc[1600, "oracle", "hard_error"]))
+
+
+def test_what_the_floors_hide_of_the_study_is_what_its_runs_say() -> None:
+    runs = pd.read_csv(ROOT / "docs/exploration-ceiling/runs.csv").query("steps == 1600")
+    floors = pd.read_csv(ROOT / "docs/learner/results.csv").query("method == 'reference noise'")
+    of_scene = floors.set_index("scene")
+
+    def taken_off(run: tuple[str, int], share: int, frames: str) -> str:
+        """Of √(error² − share · floor²), the geometric mean of MAPE and MAE."""
+        columns = [f"{frames}_{metric}" for metric in ("mape", "mae")]
+        squares = [runs[c] ** 2 - share * runs["scene"].map(of_scene[c]) ** 2 for c in columns]
+        error = runs.assign(error=(squares[0] * squares[1]) ** 0.25)
+        error = error.set_index(["choice", "patches", "scene", "seed"]).sort_index()["error"]
+        return in_words(over_scenes(error["uniform", 1024], error[run]))
+
+    number = r"(\d\.\d % ± \d\.\d)"
+    pattern = (
+        rf"oracle takes {number} off these two on hard frames and {number} on uniform ones .+? "
+        rf"took {number} and {number} off as they are; "
+        rf"all patches {number} and {number} \({number} and {number}\)"
+    )
+    ways = product((("oracle", 1024), ("uniform", 4096)), (1, 0), ("hard", "uniform"))
+    measured = tuple(taken_off(*way) for way in ways)
+    assert said("docs/exploration-ceiling/README.md", pattern) == measured
+
+
 def test_how_near_samplers_come_is_what_the_runs_say() -> None:
     folder = ROOT / "docs/exploration-ceiling"
     small, scarce, quarter, clean_hour, hour = rows_of(
@@ -187,22 +270,30 @@ def test_how_near_samplers_come_is_what_the_runs_say() -> None:
     for row, name in ((small, "runs.csv"), (scarce, "scarce_ceiling.csv")):
         found = differences(pd.read_csv(folder / name).query("steps == 1600"))
         found = found[(found["scene"] == EVERYWHERE) & (found["error"] == "hard_error")]
-        by_choice = {
-            each["choice"]: Estimate(each["difference"], each["half_width"], each["seeds"])
-            for each in found.to_dict("records")
-        }
-        assert row[:2] == [as_shown(by_choice[choice]) for choice in (NO_CHOICE, "oracle")]
+        by_choice = found.set_index("choice")
+        choices = (NO_CHOICE, "oracle")
+        assert row[:2] == [as_shown(estimate_of(by_choice.loc[choice])) for choice in choices]
 
     run = ["method", "scene", "seed"]
     same_time = pd.read_csv(folder / "same_time.csv").set_index(run)
     scarce_runs = pd.read_csv(folder / "scarce_chains.csv").groupby(run).last()
     chains = pd.read_csv(folder / "without_noise.csv").query("budget == 'small'").set_index(run)
+    predicted, dear = (geometric_mean(runs, "hard") for runs in (same_time, scarce_runs))
     for cell, error, base, other in (
-        (small[2], geometric_mean(same_time, "hard"), "ours", "ours_predicted"),
+        (small[2], predicted, "ours", "ours_predicted"),
         (small[3], chains["hard_error"], "ours_uniform", "ours_exploring"),
-        (scarce[3], geometric_mean(scarce_runs, "hard"), "ours_uniform", "ours_exploring"),
+        (scarce[3], dear, "ours_uniform", "ours_exploring"),
     ):
         assert cell == as_shown(difference_of(error[base], error[other]))
+    anew = said(
+        "docs/exploration-ceiling/README.md",
+        r"drawn anew, too, predicted losses have (.+?), .+? dear (\d.+?)\.\)",
+    )
+    of_scenes = (
+        over_scenes(predicted["ours"], predicted["ours_predicted"]),
+        over_scenes(dear["ours_uniform"], dear["ours_exploring"]),
+    )
+    assert anew == (in_words(of_scenes[0], "+"), in_words(of_scenes[1]))
 
     for row, name, chosen, pool in (
         (quarter, "quarter_hour.csv", 1792, 4096),
@@ -267,6 +358,28 @@ def test_what_the_references_noise_hides_is_what_the_runs_say() -> None:
         ]
         pairs = measured[0].split("(")[1][:-1]
         assert row == [pairs, *(each.split(" (")[0] for each in measured)]
+
+
+def test_ratios_of_times_on_the_map_are_those_that_were_written() -> None:
+    folder = ROOT / "docs/exploration-ceiling"
+    written = {
+        name: (folder / name / "errors.md").read_text().splitlines()
+        for name in ("known", "long", "eager")
+    }
+    page = (folder / "predicted-losses.md").read_text().splitlines()
+    assert {*written["known"], *written["long"]} <= {*page}
+
+    def times(name: str, setting: str, sampler: str) -> list[str]:
+        """To the same tail and to the same mean error, with reuse."""
+        rows = ([cell.strip() for cell in line.split("|")[1:-1]] for line in written[name][4:])
+        (row,) = [row for row in rows if (row[0], row[2], row[3]) == (setting, "yes", sampler)]
+        return row[-2:]
+
+    shown = rows_of("docs/exploration-ceiling/predicted-losses.md", "Eager, with reuse")[2:8]
+    settings = ("base", "dimensions 2, active 2", "noise 1", "dimensions 32", "volume 0.1")
+    for row, setting in zip(shown, [*settings, "volume 0.001"], strict=True):
+        assert row[2:4] == times("eager", setting, "predicted loss, eager")
+        assert row[4] == ", ".join(times("long", setting, "predicted loss"))
 
 
 def test_what_could_be_had_at_a_tenth_is_what_the_runs_say() -> None:

@@ -2,6 +2,7 @@
 
 import re
 import shlex
+import subprocess
 from collections.abc import Iterator
 from dataclasses import fields
 from importlib import import_module
@@ -109,3 +110,18 @@ def test_a_run_that_is_opened_lies_where_training_has_put_it(
     jobs += [["+sweeps=demo", f"method={name}"] for name in ("uniform", "active_exploration")]
     folders = {relpath(known_to_hydra(*completed(job)).run.folder) for job in jobs}
     assert shown <= folders
+
+
+def test_only_the_runs_of_a_report_are_launched_elsewhere() -> None:
+    """Costs are measured here; options of another launcher would be refused."""
+    options = "hydra/launcher=joblib hydra.launcher.n_jobs=4 seed=0"
+    command = ["make", "--dry-run", "--no-print-directory", "report", f"OPTIONS={options}"]
+    said = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    costs, runs = (
+        re.search(rf"{program} -m [^;&|]*", said.replace("\\\n", ""))
+        for program in ("ngi costs", "ngi.train")
+    )
+    assert costs is not None
+    assert runs is not None
+    assert costs[0].split()[-2:] == ["hydra/launcher=basic", "seed=0"]
+    assert runs[0].split()[-3:] == options.split()

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from analysis.exploration_map.runs import at_base
 from analysis.readme_table import judged_claims
 from analysis.runs import METRICS
 from analysis.statistics import paired_difference
@@ -153,6 +154,29 @@ def test_the_page_of_results_says_of_the_map_what_the_map_says() -> None:
     low, high = said("docs/results.md", r"For the \*mean\* error it takes (\d) to (\d) times")
     slower = sorted(round(1 / base["error_uniform", reuse]) for reuse in (True, False))
     assert slower == [int(low), int(high)]
+
+
+def test_the_map_says_of_its_base_what_its_ratios_say() -> None:
+    speedups = pd.read_csv(ROOT / "docs/exploration-map/speedups.csv")
+    base = at_base(speedups[speedups["sampler"] == "loss_greedy"], set())
+    base = base.set_index(["error", "reuse"])
+
+    def shown(error: str, reuse: bool) -> str:
+        ratio, *interval = (
+            f"{number:.2f}" if number < 1 else f"{number:.1f}"
+            for number in base.loc[(error, reuse), ["speedup", "low", "high"]]
+        )
+        return f"{ratio} ({' to '.join(interval)})"
+
+    interval = r"(\d\.\d+ \(\d\.\d+ to \d\.\d+\))"
+    page = "docs/exploration-map/README.md"
+    assert said(page, rf"every batch new \| ≥ 9.2 \| .+? \| {interval}") == (
+        shown("error_uniform", False),
+    )
+    assert said(page, rf"self-tuning reuse \| {interval} \| .+? \| {interval}") == (
+        shown("error_tail", True),
+        shown("error_uniform", True),
+    )
 
 
 def test_the_readme_says_of_dear_patches_what_their_runs_say() -> None:

@@ -48,6 +48,16 @@ def test_readme_stays_a_front_door() -> None:
     assert len((ROOT / "README.md").read_text().splitlines()) <= 150
 
 
+def test_the_scene_of_the_readme_is_the_tutorials() -> None:
+    shown, made = (
+        re.search(r"```yaml.*\n(name: lamp\n[^`]*)```", (ROOT / page).read_text())
+        for page in ("README.md", "docs/tutorials/scene.md")
+    )
+    assert shown is not None
+    assert made is not None
+    assert shown[1] == made[1]
+
+
 def test_every_option_has_its_place_in_the_reference(documentation: ModuleType) -> None:
     page = documentation.options()
     options = [file.relative_to(ROOT / "conf") for file in (ROOT / "conf").rglob("*/*.yaml")]

@@ -104,9 +104,8 @@ class Sequences(Samples):
             torch.log1p(_finite(self._noisy_frame(v, resolution, seed=derive_seed(TEST_SEED, t))))
             for t, v in enumerate(path)
         ]
-        of_path = torch.stack(
-            [self._renderer.image_buffers(v, resolution=resolution).cpu() for v in path]
-        )
+        before = [self._renderer.image_buffers(v, resolution=resolution).cpu() for v in path[:-1]]
+        of_path = torch.stack([*before, buffers.cpu()])
         sources = self._sources(
             of_path[None],
             path[None],

@@ -79,8 +79,11 @@ class PathTracing:
 
     def radiance(self, scene_vector: Tensor, *, resolution: int) -> Tensor:
         """[H, W, 3] linear radiance of the next frame, denoised."""
+        radiance = self.trace(scene_vector, resolution=resolution)
+        if self.denoiser is None:
+            return radiance
         buffers = self.renderer.image_buffers(scene_vector, resolution=resolution)
-        return self.denoise(self.trace(scene_vector, resolution=resolution), buffers.cpu())
+        return self.denoise(radiance, buffers.cpu())
 
     def test_inputs(self, scene_vector: Tensor, buffers: Tensor) -> tuple[Tensor, ...]:
         """What an `ngi.evaluate.Evaluator` gives to `predict` beside buffers: the next frame."""

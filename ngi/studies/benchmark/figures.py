@@ -25,8 +25,10 @@ class Figure:
 
 
 def figure(name: str, values: Sequence[float], unit: str, limit: str = "") -> Figure:
-    quartiles = statistics.quantiles(values, n=4) if len(values) > 1 else [values[0]] * 3
-    return Figure(name, statistics.median(values), quartiles[0], quartiles[2], unit, limit)
+    lower, upper = min(values), max(values)
+    if len(values) > 2:  # of two, Python's lie outside of them
+        lower, _, upper = statistics.quantiles(values, n=4)
+    return Figure(name, statistics.median(values), lower, upper, unit, limit)
 
 
 def ratio(numerator: Sequence[float], denominator: Sequence[float]) -> list[float]:
