@@ -118,15 +118,16 @@ def test_a_frame_before_is_found_by_its_camera() -> None:
 def test_test_frames_are_led_to_and_are_themselves_the_last() -> None:
     samples = sequences()
     v = torch.tensor([0.2, 0.4, 0.6, 0.8])
-    noisy, earlier, sources = samples.test_inputs(v, torch.zeros(24, 24, 1))
+    renderer = Walking(patch_size=PATCH)
+    buffers = renderer.image_buffers(v, resolution=24)
+    noisy, earlier, sources = samples.test_inputs(v, buffers)
     assert noisy.shape == (FRAMES, 24, 24, 3)
     assert earlier.shape == (FRAMES - 1, 24, 24, samples.layout.channels)
     assert sources.shape == (FRAMES - 1, 24, 24)
-    renderer = Walking(patch_size=PATCH)
     _, clean = renderer.whole_image(v, 24)
     torch.testing.assert_close(torch.expm1(noisy[-1]), clean)
     assert not torch.allclose(noisy[0], noisy[-1])
-    again = samples.test_inputs(v, torch.zeros(24, 24, 1))
+    again = samples.test_inputs(v, buffers)
     assert all(torch.equal(a, b) for a, b in zip((noisy, earlier, sources), again, strict=True))
 
 
