@@ -2,10 +2,11 @@
 
 import numpy as np
 import pandas as pd
+import pytest
 
 from tests.docs.test_ceiling_figures import rows_of, tenths
 from tests.docs.test_figures import geometric_mean, said
-from tests.docs.test_from_buffers import FOLDER, FRAMES
+from tests.docs.test_from_buffers import FOLDER, FRAMES, errors_of
 
 PAGE = "docs/exploration-ceiling/small-patches.md"
 SECTION = "For an hour"
@@ -70,3 +71,29 @@ def test_what_looking_takes_is_what_the_run_says() -> None:
     last = runs.iloc[-1]
     share = f"{100 * last.explore_seconds / last.run_seconds:.1f}"
     assert said(PAGE, r"looking took ([\d.]+) % of the run time on living-room") == (share,)
+
+
+def rows_of_the_clock() -> list[list[str]]:
+    """After each quarter of the hour."""
+    runs = pd.read_csv(FOLDER / "hour_same_time.csv").set_index("method")
+    uniform, small = (runs.loc[f"ours_{name}"] for name in ("uniform", "small_patches"))
+    assert len(uniform) == len(small) == 12
+    rows = []
+    for number in (2, 5, 8, 11):
+        before, now = (method.iloc[[number]] for method in (uniform, small))
+        errors = zip(errors_of(before), errors_of(now), strict=True)
+        changes = [tenths(b.iloc[0] / a.iloc[0] - 1) for a, b in errors]
+        steps = [f"{method.step.iloc[0]:,}" for method in (before, now)]
+        seconds = [method.run_seconds.iloc[0] for method in (before, now)]
+        assert seconds == pytest.approx([300 * (number + 1)] * 2, rel=0.02)
+        rows.append([*steps, f"{now.patches_traced.iloc[0]:,}", *changes])
+    return rows
+
+
+def test_what_an_hour_of_the_clock_gives_is_what_its_runs_say() -> None:
+    rows = rows_of_the_clock()
+    assert rows_of(PAGE, "After the same hour")[2:] == rows
+    (_, _, _, before, *_), (_, _, _, hard, _, uniform, _) = rows[-2:]
+    words = r"sphere-caustic ends the hour with ([\d.]+) % less error on hard frames and ([\d.]+) %"
+    assert said(PAGE, words) == (hard.lstrip("−"), uniform.lstrip("−"))
+    assert said(PAGE, r"It was ([\d.]+) % less after three quarters") == (before.lstrip("−"),)
