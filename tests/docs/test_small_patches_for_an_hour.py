@@ -97,3 +97,17 @@ def test_what_an_hour_of_the_clock_gives_is_what_its_runs_say() -> None:
     words = r"sphere-caustic ends the hour with ([\d.]+) % less error on hard frames and ([\d.]+) %"
     assert said(PAGE, words) == (hard.lstrip("−"), uniform.lstrip("−"))
     assert said(PAGE, r"It was ([\d.]+) % less after three quarters") == (before.lstrip("−"),)
+    overview = r"sphere-caustic, with ([\d.]+) % less after as much time \(([\d.]+) % before"
+    assert said("docs/exploration-ceiling/README.md", overview) == (
+        hard.lstrip("−"),
+        before.lstrip("−"),
+    )
+    assert said("README.md", r"\[([\d.]+) % at the end of the hour\]") == (hard.lstrip("−"),)
+
+
+def test_windows_of_stored_patches_gain_what_their_table_says() -> None:
+    runs = pd.read_csv(FOLDER / "quarter_windows.csv").set_index(["data", "step"])
+    columns = zip(errors_of(runs.loc["whole"]), errors_of(runs.loc["windows"]), strict=True)
+    table = pd.DataFrame([windows / whole - 1 for whole, windows in columns]).T
+    shown = rows_of(PAGE, "Is it the noise of the gradients?")[2:]
+    assert shown == [[tenths(change) for change in row] for row in table.to_numpy()]
