@@ -97,7 +97,7 @@ def _train(config: DictConfig, run: learn.Run, *, closing: ExitStack) -> dict[st
         checkpoint_seconds=config.run.checkpoint_seconds,
         checkpoint_steps=config.run.checkpoint_steps,
     )
-    run.module.rehearse(run.samples.blank(2))
+    run.module.rehearse(run.samples.blank(2), targets=recorder.targets)
     if config.viewer:
         view = _live_view(config, run)
         closing.callback(view.close)

@@ -83,11 +83,13 @@ class IlluminationModule(LightningModule):
                 raise
             raise ValueError(f"optimizer: {error}") from error
 
-    def rehearse(self, patches: Patches) -> None:
+    def rehearse(self, patches: Patches, *, targets: Iterable[Target] = ()) -> None:
         """Makes a training step's computations without training, before any long work.
 
+        targets: others that are asked for besides the sampler's
+
         Raises what would otherwise be raised at the first steps: samples that are not what the
-        network takes, patches smaller than the loss's window, an optimiser or a network that the
+        network takes, patches smaller than the loss's window, an optimiser or a network that a
         target can not score, a wrong learning rate.
         """
         self._check_inputs(patches)
@@ -95,6 +97,8 @@ class IlluminationModule(LightningModule):
         with self.learner.scorer.watch(patches, patches, optimizer) as score:
             losses, prediction = self.learner.losses(patches)
         score(prediction, losses)
+        for target in targets:
+            self._scorer_of(target).signals(patches, optimizer)
 
     def on_fit_start(self) -> None:
         """ValueError for float16, whose losses have to be scaled for their gradients' sake.

@@ -3,6 +3,7 @@
 from typing import Any
 
 from ngi.evaluate import Evaluation, Evaluator
+from ngi.explore import Target
 from ngi.learn.run import Run
 from ngi.learn.target_map import TargetMap
 from ngi.machine.memory import usage
@@ -23,6 +24,11 @@ class Recorder:
         self._target_map = target_map
         self._predict = run.interruption.checked(run.module.predict)
         self._label = label
+
+    @property
+    def targets(self) -> tuple[Target, ...]:
+        """Whose densities are asked of the network."""
+        return () if self._target_map is None else (self._target_map.target,)
 
     def prepare(self) -> None:
         """Lets the tracker begin, and renders the reference images that are not cached yet."""

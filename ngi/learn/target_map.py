@@ -55,7 +55,7 @@ class TargetMap:
             if count < 1:
                 raise ValueError(f"evaluation.target_map.{name}: {count}; expected at least 1")
         self._states = map_states(cells, positions_per_cell)
-        self._target = target
+        self.target = target
         self._resolution = resolution
         self._samples = samples
         self._signals = signals
@@ -77,11 +77,11 @@ class TargetMap:
         See `ngi.files.record_log.TARGET_MAPS`.
         """
         self.prepare()
-        signals = [self._signals(patches.expand(), self._target) for patches in self._patches]
+        signals = [self._signals(patches.expand(), self.target) for patches in self._patches]
         return {
             "state": self._states.numpy(),
             "loss": self._grid([part.loss for part in signals]),
-            "target": self._grid([self._target(part) for part in signals]),
+            "target": self._grid([self.target(part) for part in signals]),
         }
 
     def _render(self, states: Tensor, *, seed: int) -> CompactPatches:

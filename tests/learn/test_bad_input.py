@@ -59,6 +59,15 @@ def test_an_error_of_the_command_line_ends_it(
         (["reuse.when_late=maybe"], ["reuse.when_late", "maybe"]),
         (["optimizer._target_=torch.optim.AdamW"], ["optimizer.weight_decay is 0.01"]),
         (["optimizer._target_=torch.optim.SGD"], ["SGD", "optimizer=muon"]),
+        (
+            [
+                *("renderer.dimensions=2", "sampler=uniform"),
+                "optimizer._target_=torch.optim.SGD",
+                "evaluation.target_map={_target_: ngi.learn.TargetMap, _partial_: true, cells: 2, "
+                "positions_per_cell: 1, target: {_target_: ngi.explore.LossTimesStep}}",
+            ],
+            ["SGD", "optimizer=muon"],
+        ),
         (["optimizer.lr=-1"], ["optimizer: Invalid learning rate: -1"]),
         (["optimizer=muon", "optimizer.momentum=1"], ["optimizer.momentum: 1"]),
         (
