@@ -118,10 +118,10 @@ def test_path_tracing_does_not_set_the_time_that_methods_are_compared_at(folder,
     without = answers(folder)
     file = make_run(method="path_tracing") / "metrics.csv"
     pd.read_csv(file).tail(1).assign(run_seconds=0.0).to_csv(file, index=False)
-    traced = [line for line in answers(folder).splitlines() if "path_tracing" in line]
-    errors, rest = answers(folder).split("\n\n")[-3:-1], without.split("\n\n")[-3:-1]
-    assert traced
-    for found, expected in zip(errors, rest, strict=True):
+    traced = answers(folder)
+    assert "path_tracing" in traced
+    parts = (answer.split("\n\n")[-3:-1] for answer in (traced, without))
+    for found, expected in zip(*parts, strict=True):
         kept = [line.split() for line in found.splitlines() if "path_tracing" not in line]
         assert kept == [line.split() for line in expected.splitlines()]
 

@@ -3,7 +3,7 @@
 import pandas as pd
 
 from ngi.files.resources import root
-from tests.docs.test_ceiling_figures import rows_of, tenths
+from tests.docs.tables import rows_of, tenths
 
 PAGE, SECTION = "docs/learner/README.md", "Where the error is left"
 COLUMNS = [f"{frames}_{of}" for frames in ("hard", "uniform") for of in ("error", "mae", "tail")]

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from tests.docs.pages import ROOT
-from tests.docs.test_ceiling_figures import as_shown, difference_of, rows_of, tenths
+from tests.docs.tables import as_shown, difference_of, rows_of, tenths
 from tests.docs.test_figures import geometric_mean, said
 
 FOLDER = ROOT / "docs/exploration-ceiling"

@@ -5,12 +5,13 @@ import pytest
 
 from analysis.statistics import estimate
 from tests.docs import test_from_buffers as from_buffers
-from tests.docs.test_ceiling_figures import rows_of, tenths
+from tests.docs.tables import rows_of, tenths
 from tests.docs.test_figures import geometric_mean, said
 from tests.docs.test_from_buffers import (
     FOLDER,
     FRAMES,
     changes_of,
+    errors_of,
     last_of,
     less,
     mean_of,
@@ -201,3 +202,11 @@ def test_what_more_scene_vectors_cost_is_what_runs_on_one_machine_took(runs: pd.
     }
     shown = said(PAGE, r"took (\d+) % longer on living-room, (\d+) % on sphere-caustic and (\d+) %")
     assert [*shown] == [f"{100 * (ratios[scene] - 1):.0f}" for scene in SAME_MACHINE]
+
+
+def test_windows_of_stored_patches_gain_what_their_table_says() -> None:
+    runs = pd.read_csv(FOLDER / "quarter_windows.csv").set_index(["data", "step"])
+    columns = zip(errors_of(runs.loc["whole"]), errors_of(runs.loc["windows"]), strict=True)
+    table = pd.DataFrame([windows / whole - 1 for whole, windows in columns]).T
+    shown = rows_of(PAGE, "Is it the noise of the gradients?")[2:]
+    assert shown == [[tenths(change) for change in row] for row in table.to_numpy()]

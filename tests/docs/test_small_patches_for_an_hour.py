@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.docs.test_ceiling_figures import rows_of, tenths
+from tests.docs.tables import rows_of, tenths
 from tests.docs.test_figures import geometric_mean, said
 from tests.docs.test_from_buffers import FOLDER, FRAMES, errors_of
 
@@ -103,11 +103,3 @@ def test_what_an_hour_of_the_clock_gives_is_what_its_runs_say() -> None:
         before.lstrip("−"),
     )
     assert said("README.md", r"\[([\d.]+) % at the end of the hour\]") == (hard.lstrip("−"),)
-
-
-def test_windows_of_stored_patches_gain_what_their_table_says() -> None:
-    runs = pd.read_csv(FOLDER / "quarter_windows.csv").set_index(["data", "step"])
-    columns = zip(errors_of(runs.loc["whole"]), errors_of(runs.loc["windows"]), strict=True)
-    table = pd.DataFrame([windows / whole - 1 for whole, windows in columns]).T
-    shown = rows_of(PAGE, "Is it the noise of the gradients?")[2:]
-    assert shown == [[tenths(change) for change in row] for row in table.to_numpy()]
