@@ -26,23 +26,58 @@ def emission(scene: mi.Scene, hit: mi.SurfaceInteraction3f) -> mi.Color3f:
 
 
 _SOBOL_DIMENSIONS = (1, 2, 3, 4, 5)
+_ONE = np.ones(1)
+
 _LEAST_DENSITY = 1e-30
 """What is divided by where a density is 0, so that nothing becomes NaN."""
 
 
-def light_points(count: int) -> NDArray[np.float64]:
-    """[count, 5] points in the unit hypercube that go with `ngi.render.tracing.subpixel_points`:
-    the lobe of the BSDF, the place on the emitters, and the direction within the lobe.
+def light_points(count: int, emitters: NDArray[np.float64] = _ONE) -> NDArray[np.float64]:
+    """[count, 6] points that go with `ngi.render.tracing.subpixel_points`: five numbers in the unit
+    hypercube, which are the lobe of the BSDF, the place on the emitters, and the direction within
+    the lobe; and the weight of the emitter sample.
 
-    Those are the number of the point and the first dimension of a Sobol sequence (a Hammersley
-    set); these are later dimensions of it (Joe and Kuo 2008), shifted to the cells' middle as
-    well. 16 of them have one point in every elementary interval of each pair that is used
+    The points of a pixel are the number of the point and the first dimension of a Sobol sequence
+    (a Hammersley set); these are later dimensions of it (Joe and Kuo 2008), shifted to the cells'
+    middle as well. 16 of them have one point in every elementary interval of each pair that is used
     together, and of each dimension together with the number of the point.
+
+    Each emitter has a whole number of points, at least one, the same in all pixels: by itself an
+    emitter of probability 0.1 would be as bright as 2 of 16 points make it. The weight is what its
+    probability is of its share of the points. With fewer points than emitters it is 1.
+
+    emitters: [e] probability with which each is chosen, see `emitter_probabilities`
     """
     cells = 2 ** int(count - 1).bit_length()
     sobol = SobolEngine(max(_SOBOL_DIMENSIONS) + 1).draw(count).double().numpy()
     points: NDArray[np.float64] = sobol[:, _SOBOL_DIMENSIONS] + 0.5 / cells
-    return points
+    if not 1 < np.count_nonzero(emitters) <= count:
+        return np.column_stack([points, np.ones(count)])
+    shares = _shares(emitters, count)
+    chosen = np.repeat(np.arange(len(emitters)), shares)
+    within = np.concatenate([(np.arange(share) + 0.5) / share for share in shares if share])
+    place = (np.cumsum(emitters) - emitters)[chosen] + emitters[chosen] * within
+    weight = count * emitters[chosen] / shares[chosen]
+    order = points[:, 1].argsort()
+    points[order, 1] = place
+    return np.column_stack([points, weight[order.argsort()]])
+
+
+def emitter_probabilities(scene: mi.Scene) -> NDArray[np.float64]:
+    """[e], with which `scene.sample_emitter_direction` chooses each; one of 1 where none is."""
+    weights = np.array([float(emitter.sampling_weight()) for emitter in scene.emitters()])
+    return weights / weights.sum() if weights.sum() > 0 else _ONE
+
+
+def _shares(emitters: NDArray[np.float64], count: int) -> NDArray[np.int64]:
+    """[e]: how many of `count` points each gets, by largest remainders; one at least."""
+    exact, least = count * emitters, emitters > 0
+    shares = np.maximum(np.floor(exact), least)
+    while shares.sum() < count:
+        shares[np.argmax(exact - shares)] += 1
+    while shares.sum() > count:
+        shares[np.argmax(np.where(shares > least, shares - exact, -np.inf))] -= 1
+    return shares.astype(np.int64)
 
 
 def direct_light(
@@ -50,13 +85,13 @@ def direct_light(
 ) -> mi.Color3f:
     """Linear radiance that leaves a hit against its ray after one bounce from an emitter.
 
-    hit: a miss gives zero. point: five numbers in [0, 1), of `light_points`.
+    hit: a miss gives zero. point: of `light_points`.
 
     What a mirror or smooth glass shows of an emitter counts; of several lobes one is chosen.
     """
     if mi.variant().startswith("scalar") and not hit.is_valid():
         return mi.Color3f(0)  # asking a miss for its BSDF would crash
-    lobe, *numbers = point
+    lobe, *numbers, emitter_weight = point
     active, bsdf, context = hit.is_valid(), hit.bsdf(), mi.BSDFContext()
     towards, irradiance = scene.sample_emitter_direction(
         hit, mi.Point2f(numbers[0], numbers[1]), True, active
@@ -65,7 +100,8 @@ def direct_light(
     value, density, sample, weight = bsdf.eval_pdf_sample(
         context, hit, hit.to_local(towards.d), lobe, mi.Point2f(numbers[2], numbers[3]), active
     )
-    by_emitter = value * irradiance * dr.select(towards.delta, 1, _share(towards.pdf, density))
+    share = dr.select(towards.delta, 1, _share(towards.pdf, density))
+    by_emitter = value * irradiance * share * emitter_weight
     scattered = active & (sample.pdf > 0)
     ray = hit.spawn_ray(hit.to_world(sample.wo))
     met = scene.ray_intersect_preliminary(ray, False, scattered)

@@ -14,13 +14,15 @@ from dataclasses import dataclass
 from math import prod
 from typing import Any
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from ngi.machine.backend import dr, mi
 from ngi.machine.hand_over import stacked
 from ngi.render.caustics import Caustics, photon_points
-from ngi.render.direct_light import light_points
+from ngi.render.direct_light import emitter_probabilities, light_points
 from ngi.render.first_hit import FirstHit
 from ngi.render.fitting import does_not_fit
 from ngi.render.tracing import Pending, Pixels, Tracer, Window, subpixel_points
@@ -110,7 +112,7 @@ class JitTracer(Tracer):
             window, numbers = Window(0, 0, side, side, side), [mi.UInt32(pixels.numbers.numpy())]
         self._prepare(window)
         if samples not in self._points:
-            self._points[samples] = _points(samples)
+            self._points[samples] = _points(samples, emitter_probabilities(self._scene))
         view, rays = _View.of(window, samples), prod(pixels.shape) * samples
         points = self._points[samples]
         photons = isinstance(pixels, Window) or pixels.caustics
@@ -165,12 +167,12 @@ class _PhotonLight:
         return self._light
 
 
-def _points(samples: int) -> tuple[mi.Point2f, list[mi.Float]]:
+def _points(samples: int, emitters: NDArray[np.float64]) -> tuple[mi.Point2f, list[mi.Float]]:
     """Where in each pixel its rays go through, and the numbers that go with each for the light."""
     points = subpixel_points(samples)
     on_device = (
         mi.Point2f(points[:, 0], points[:, 1]),
-        [mi.Float(numbers) for numbers in light_points(samples).T],
+        [mi.Float(numbers) for numbers in light_points(samples, emitters).T],
     )
     dr.eval(on_device)
     return on_device

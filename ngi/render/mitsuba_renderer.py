@@ -89,8 +89,8 @@ class MitsubaRenderer(Renderer):
         self._variant = activate(backend)
         if direct == "with_caustics" and self._variant == "scalar_rgb":
             raise ValueError(
-                "renderer.direct 'with_caustics': Mitsuba's scalar variant is too slow for "
-                "photons; use renderer.direct=traced, or see what `ngi doctor` says about LLVM"
+                "renderer.direct 'with_caustics': Mitsuba's scalar variant is too slow; see what "
+                "`ngi doctor` says about LLVM, or train with renderer.direct=traced"
             )
         # Scenes of a sweep's finished jobs are left in cycles, and slow every launch down.
         gc.collect()

@@ -10,7 +10,7 @@ import torch
 from numpy.typing import NDArray
 
 from ngi.machine.backend import mi
-from ngi.render.direct_light import light_points
+from ngi.render.direct_light import emitter_probabilities, light_points
 from ngi.render.first_hit import FirstHit
 from ngi.render.tracing import Pending, PixelList, Pixels, Tracer, Window, subpixel_points
 
@@ -45,7 +45,8 @@ class ScalarTracer(Tracer):
         return lambda: result
 
     def buffers(self, pixels: Pixels, *, samples: int) -> Pending:
-        points, lights = subpixel_points(samples), light_points(samples).tolist()
+        emitters = emitter_probabilities(self._scene)
+        points, lights = subpixel_points(samples), light_points(samples, emitters).tolist()
         means = [
             self._pixel(points, lights, x, y, pixels.resolution) for y, x in _coordinates(pixels)
         ]
@@ -61,7 +62,7 @@ class ScalarTracer(Tracer):
         y: int,
         resolution: int,
     ) -> NDArray[np.float64]:
-        """points, lights: [n, 2] and [n, 5], of `subpixel_points` and `light_points`"""
+        """points, lights: [n, 2] and [n, 6], of `subpixel_points` and `light_points`"""
         sensor = self._scene.sensors()[0]
         samples: list[list[mi.Float]] = []
         for point, light_point in zip(

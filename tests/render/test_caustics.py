@@ -264,7 +264,7 @@ def test_light_stays_on_the_side_of_the_surface_that_it_falls_on(load, tmp_path)
 
 
 def test_python_is_too_slow_for_photons(load) -> None:
-    with pytest.raises(ValueError, match=r"use renderer\.direct=traced"):
+    with pytest.raises(ValueError, match=r"too slow; see .* with renderer\.direct=traced"):
         load(FLOOR + BULB, backend="scalar")
 
 

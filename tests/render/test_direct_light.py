@@ -216,15 +216,60 @@ def test_light_that_changes_out_of_view_changes_the_direct_light(load, backend) 
 
 
 def test_sixteen_points_are_spread_evenly_in_each_pair_used_together() -> None:
-    points = np.concatenate([subpixel_points(16), light_points(16)], axis=1)
+    points = np.concatenate([subpixel_points(16), light_points(16)[:, :5]], axis=1)
     assert ((points > 0) & (points < 1)).all()
     together = [(0, 1), (3, 4), (5, 6), *((0, i) for i in range(2, 7))]
     for pair in together:
         for k in range(5):
             cells = np.floor(points[:, pair] * [2**k, 2 ** (4 - k)])
             assert len(np.unique(cells, axis=0)) == 16, (pair, k)
-    assert light_points(1).tolist() == [[0.5] * 5]
+    assert light_points(1).tolist() == [[0.5] * 5 + [1.0]]
     assert len(np.unique(light_points(5), axis=0)) == 5
+
+
+@pytest.mark.parametrize("count", [5, 8, 16, 64])
+@pytest.mark.parametrize(
+    "emitters", [[1, 1, 1], [12, 2.5, 0.3, 0.3, 8], [1, 0, 3, 1], [1, 1, 1, 1, 1], [0.001, 1]]
+)
+def test_whatever_the_number_of_points_each_emitter_is_as_bright(count, emitters) -> None:
+    """The weighted mean over the points of 1 / probability, as a sample's light is divided."""
+    probability = np.array(emitters) / np.sum(emitters)
+    ends = np.cumsum(probability)
+    points = light_points(count, probability)
+    assert ((points[:, :5] > 0) & (points[:, :5] < 1)).all()
+    chosen = np.searchsorted(ends, points[:, 1])
+    light = points[:, 5] / probability[chosen] / count
+    found = np.bincount(chosen, light, minlength=len(emitters))
+    np.testing.assert_allclose(found, probability > 0, rtol=1e-12)
+    within = (points[:, 1] - (ends - probability)[chosen]) / probability[chosen]
+    for emitter in np.unique(chosen):
+        spread = np.sort(within[chosen == emitter])
+        np.testing.assert_allclose(spread, (np.arange(len(spread)) + 0.5) / len(spread), atol=1e-9)
+
+
+def test_emitters_of_one_probability_each_have_the_points_that_they_had() -> None:
+    for equal in (1, 2, 4, 8):
+        points = light_points(16, np.full(equal, 1 / equal))
+        assert np.array_equal(points[:, :5], light_points(16)[:, :5])
+        assert (points[:, 5] == 1).all()
+
+
+def test_lamps_that_are_seldom_chosen_light_the_floor_as_the_others_do(load, backend) -> None:
+    """Of 16 rays none took the seldom one, and the light of others was rounded to sixteenths."""
+    seldom = BULB.replace("</emitter>", '<float name="sampling_weight" value="0.02"/></emitter>')
+    green = BULB.replace("bulb", "green").replace("0.5, 0.2, 2", "-0.5, 0.2, 2")
+    both = load(FLOOR + seldom + green, backend=backend, buffer_samples=16)
+    found = direct(both)
+    alone = direct(load(FLOOR + BULB, backend=backend, buffer_samples=16))
+    other = direct(
+        load(
+            FLOOR + green,
+            backend=backend,
+            buffer_samples=16,
+            variables=("{object: green, property: intensity, minimum: 1, maximum: 2}",),
+        )
+    )
+    np.testing.assert_allclose(found, alone + other, rtol=0.03)  # each at other places of a pixel
 
 
 def test_other_words_are_refused(load) -> None:
