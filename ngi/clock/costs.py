@@ -40,6 +40,9 @@ OF_IMAGES = "supersampled_edges"
 NOT_AVERAGED = "ngi.models.no_average"
 """What conf/averaging/none.yaml names."""
 
+SCALAR = "scalar_rgb"
+"""Mitsuba's slow variant, as renderers describe themselves."""
+
 REMEDY = "measure it by the same command line with `ngi costs` for `ngi train`"
 
 
@@ -96,6 +99,7 @@ def components(settings: Mapping[str, Any], *, renderer: Renderer, scored: bool)
         "patches": sampler["chains"],
         **samples,
         **_gpu(),
+        **_without_llvm(renderer),
     }
     found = [
         Component("training", training),
@@ -142,6 +146,11 @@ def _averaging(settings: Mapping[str, Any]) -> dict[str, Any]:
 def _gpu() -> dict[str, str]:
     """What 'auto' means for network and renderer: costs with a GPU are not those without."""
     return {"gpu": torch.cuda.get_device_name()} if torch.cuda.is_available() else {}
+
+
+def _without_llvm(renderer: Renderer) -> dict[str, str]:
+    """What 'auto' means where neither GPU nor LLVM can be used; nothing where one of them can."""
+    return {"variant": SCALAR} if SCALAR in renderer.description else {}
 
 
 def _without(settings: Mapping[str, Any], *keys: str) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from tqdm import tqdm
 
 from ngi.evaluate.evaluation import EvaluatedFrame, Evaluation, FrameMetrics
 from ngi.evaluate.lpips_metric import Lpips
-from ngi.evaluate.metrics import image_metrics, non_finite_pixels, relmse
+from ngi.evaluate.metrics import image_metrics, non_finite_pixels, radiance_of, relmse
 from ngi.evaluate.protocol import EvaluationProtocol, Frame, evaluation_frames
 from ngi.evaluate.references import Reference, ReferenceCache
 from ngi.render.protocol import Renderer
@@ -183,7 +183,7 @@ def _radiance(predict: Predict, prepared: _PreparedFrame) -> Tensor:
         raise ValueError(
             f"prediction of shape {list(log_radiance.shape)}, expected {list(expected)}"
         )
-    return torch.expm1(log_radiance.detach().cpu().float())
+    return radiance_of(log_radiance.detach().cpu().float())
 
 
 def timed(seconds: dict[str, float], part: str, compute: Callable[..., T], *arguments: object) -> T:

@@ -44,7 +44,7 @@ def write_linear(folder: Path, pictures: Pictures, *, megabytes: float) -> str |
         return None
     from ngi.render.exr import write_exr  # Mitsuba, which closed formulas do without
 
-    folder.mkdir(parents=True)
+    folder.mkdir(parents=True, exist_ok=True)  # a viewer on NFS may hold old ones
     for (set_name, index), (prediction, reference) in pictures.items():
         for kind, image in (("prediction", prediction), ("reference", reference)):
             write_exr(_file(folder, set_name, index, kind), image, half=kept == "half")

@@ -107,6 +107,14 @@ def tone_map(radiance: Tensor, exposure: float = 0.0) -> Tensor:
     return torch.where(linear <= 0.0031308, 12.92 * linear, curve)
 
 
+def radiance_of(log_radiance: Tensor) -> Tensor:
+    """Linear radiance of what a network says, log1p radiance; negative values stay as they are.
+
+    NaN where that is not finite: of -Inf it would be a number, -1.
+    """
+    return torch.expm1(torch.where(log_radiance.isfinite(), log_radiance, torch.nan))
+
+
 def non_finite_pixels(image: Tensor) -> int:
     """Number of pixels of an [H, W, 3] image with a NaN or Inf in any channel."""
     return int((~image.isfinite()).any(dim=-1).sum())

@@ -23,6 +23,10 @@ SMALLEST_RESOLUTION = 32
 """Pixels; of smaller images LPIPS's AlexNet pools everything away."""
 
 
+FLOATS = ("target_noise", "epsilon", "exposure", "ssim_sigma")
+"""Those numbers of a protocol that need not be whole."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class EvaluationProtocol:
     """Every number that decides what a metric's value means.
@@ -54,6 +58,8 @@ class EvaluationProtocol:
     sobol_seed: int = 0
 
     def __post_init__(self) -> None:
+        for key in FLOATS:  # or 1 and 1.0 were two protocols
+            object.__setattr__(self, key, float(getattr(self, key)))
         for key, lowest in (
             ("resolution", self.smallest_resolution),
             ("low_discrepancy_frames", 1),

@@ -72,19 +72,30 @@ def relative_noise(half_a: Tensor, half_b: Tensor, epsilon: float) -> float:
 
 
 def write_reference(path: Path, reference: Reference) -> None:
-    """Writes one .npz file atomically: a crash or a full disk leaves the old file or none.
+    """Writes one .npz file atomically, where there is none: a crash or a full disk leaves none.
 
-    Several processes may write the same one. Raises OSError with what to do where that fails.
+    Of several processes that write the same one the first does (on a disk without hard links the
+    last): pictures of two backends differ in the last bits, and the first may have been compared
+    with already. Raises OSError with what to do where writing fails.
     """
     partial = path.with_suffix(f".{secrets.token_hex(8)}{PARTIAL_SUFFIX}")
     try:
         with full_disk_named(path):
             path.parent.mkdir(parents=True, exist_ok=True)
             _write(partial, reference)
-            partial.replace(path)
+            _publish(partial, path)
     finally:
         with suppress(OSError):  # of a folder that could not be made
             partial.unlink()
+
+
+def _publish(partial: Path, path: Path) -> None:
+    try:
+        os.link(partial, path)
+    except FileExistsError:
+        pass
+    except OSError:  # a disk without hard links
+        partial.replace(path)
 
 
 def _write(path: Path, reference: Reference) -> None:
@@ -164,9 +175,9 @@ class ReferenceCache:
                 return read_reference(path, resolution=protocol.resolution)
             except DamagedError as error:
                 log.warning("%s; this reference is rendered again", error)
-        reference = _render(renderer, protocol, scene_vector, key=key, on_pass=on_pass)
-        write_reference(path, reference)
-        return reference
+                path.unlink(missing_ok=True)
+        write_reference(path, _render(renderer, protocol, scene_vector, key=key, on_pass=on_pass))
+        return read_reference(path, resolution=protocol.resolution)
 
 
 def _content_key(renderer: Renderer, protocol: EvaluationProtocol, scene_vector: Tensor) -> str:

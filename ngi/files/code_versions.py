@@ -44,20 +44,35 @@ def record_code_version(folder: Path, *, after_step: int) -> None:
     after_step: the last step that is kept of what was made before
     """
     found, version = code_versions(folder), code_version()
-    if found and same_program(found[-1], version) and found[-1]["after_step"] <= after_step:
+    kept = [entry for entry in found if entry["after_step"] < after_step]
+    if kept and same_program(kept[-1], version):
+        _write(folder, kept)
         return
-    if found and after_step > 0 and not same_program(found[-1], version):
+    if kept:
         log.warning(
             "%s: goes on with %s; up to step %d it was made with %s. If what is computed has "
             "changed in between, run.on_code_change=restart begins it afresh",
             folder,
             shown(version),
             after_step,
-            shown(found[-1]),
+            shown(kept[-1]),
         )
-    kept = [entry for entry in found if entry["after_step"] < after_step]
-    content = [*kept, {**version, "after_step": after_step}]
-    write_atomically(folder / FILE, json.dumps(content, indent=2).encode())
+    _write(folder, [*kept, {**version, "after_step": after_step}])
+
+
+def made_with(folder: Path, *, last_step: int) -> dict[str, Any] | None:
+    """The version that made the last step there is, None where nothing was made yet.
+
+    Not one with which the run was started afterwards, and stopped before it made a step.
+    last_step: the last in steps.csv, saved or not; 0 of what makes no steps
+    """
+    found = code_versions(folder)
+    made = [entry for entry in found if entry["after_step"] < last_step]
+    return made[-1] if made else found[-1] if found else None
+
+
+def _write(folder: Path, versions: list[dict[str, Any]]) -> None:
+    write_atomically(folder / FILE, json.dumps(versions, indent=2).encode())
 
 
 def same_program(earlier: dict[str, Any], now: dict[str, Any]) -> bool:

@@ -15,7 +15,7 @@ from ngi.files.durable import damage_named, write_atomically
 from ngi.files.record_log import CHAINS, TARGET_MAPS, RecordLog
 from ngi.files.row_log import RowLog
 
-SETTINGS, RESULT = "settings.json", "result.json"
+SETTINGS, RESULT, STEPS = "settings.json", "result.json", "steps.csv"
 LAST, PREVIOUS = "last.ckpt", "previous.ckpt"
 STABLE = "stable.ckpt"
 """The last checkpoint before the learning rate decayed."""
@@ -53,7 +53,7 @@ class RunFolder:
         self.stable_checkpoint = path / STABLE
         self.patches = path / "patches"
         self.metrics = RowLog(path / "metrics.csv")
-        self.steps = RowLog(path / "steps.csv")
+        self.steps = RowLog(path / STEPS)
         self.chains = RecordLog(path / "chains.bin", description=CHAINS)
         self.target_maps = RecordLog(path / "target_map.bin", description=TARGET_MAPS)
         self.logs = (self.steps, self.metrics, self.chains, self.target_maps)
@@ -102,12 +102,18 @@ class RunFolder:
 
     def _forget(self) -> None:
         """Deletes what this run would go on with; checkpoints first, on which the rest depends."""
-        logs = (log.path for log in self.logs)
         others = (self.path / name for name in (code_versions.FILE, TRACKED))
         checkpoints = (self.path / name for name in CHECKPOINTS)
-        for file in (*checkpoints, self._result, *logs, *others):
+        for file in (*checkpoints, self._result, *others):
             file.unlink(missing_ok=True)
+        self.begin_logs()
         shutil.rmtree(self.patches, ignore_errors=True)
+
+    def begin_logs(self) -> None:
+        """Deletes what a start left that was never saved: its columns were perhaps other ones."""
+        for log in self.logs:
+            log.close()
+            log.path.unlink(missing_ok=True)
 
     def write_result(self, result: dict[str, Any]) -> dict[str, Any]:
         """Writes and returns it, with what only the folder knows.
@@ -143,10 +149,18 @@ class RunFolder:
             ) from error
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
+        except BlockingIOError as error:
             lock.close()
             raise RuntimeError(
                 f"{self.path}: another process is training this run; wait for it or stop it"
+            ) from error
+        except OSError as error:
+            lock.close()
+            raise OSError(
+                error.errno,
+                f"{error.strerror}: this disk can not lock files, without which two processes "
+                "could train one run; choose a folder on another disk with run.folder=…",
+                str(self.path),
             ) from error
         return lock
 

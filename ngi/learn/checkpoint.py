@@ -30,6 +30,8 @@ DECAYS_FROM = "decays_from"
 """Key, in the state of `BudgetAndCheckpoint`, of the step after which the learning rate's decay
 began; None before."""
 
+OTHER_FOLDER = "choose another folder with run.folder=… for the longer run"
+
 CHECKSUM_BYTES = hashlib.sha256().digest_size
 """A checkpoint file ends with the SHA-256 of what comes before; torch.load does not mind."""
 
@@ -69,14 +71,19 @@ def prepare_resume(folder: RunFolder) -> Path | None:
     if folder.restarted:
         return None
     checkpoint = _newest_usable(folder)
-    if folder.lengthened and checkpoint is not None:
-        checkpoint = _before_decay(folder, checkpoint)
-    if folder.lengthened:
-        folder.forget_result()
-    step = 0 if checkpoint is None else checkpoint["global_step"]
-    dropped = {log_file: log_file.keep_until(step) for log_file in folder.logs}
+    if checkpoint is None and folder.lengthened:
+        raise ValueError(
+            f"{folder.path} can not be trained longer: there is no checkpoint in it; put "
+            f"{folder.checkpoint.name} back, or {OTHER_FOLDER}"
+        )
     if checkpoint is None:
+        folder.begin_logs()
         return None
+    if folder.lengthened:
+        checkpoint = _before_decay(folder, checkpoint)
+        folder.forget_result()
+    step = checkpoint["global_step"]
+    dropped = {log_file: log_file.keep_until(step) for log_file in folder.logs}
     log.info(
         "%s: going on from step %d, the last that was saved; later ones are done again (%d are in "
         "steps.csv, a killed run may have done more)",
@@ -103,10 +110,9 @@ def _newest_usable(folder: RunFolder) -> dict[str, Any] | None:
         os.replace(path, folder.checkpoint)
         return checkpoint
     if problems:
-        raise ValueError(
-            f"{'; '.join(problems)}; put back a copy, or delete every checkpoint (*.ckpt) in "
-            f"{folder.path} and the same command starts the run afresh"
-        )
+        afresh = f"delete every checkpoint (*.ckpt) in {folder.path} and the same command starts "
+        remedy = OTHER_FOLDER if folder.lengthened else f"{afresh}the run afresh"
+        raise ValueError(f"{'; '.join(problems)}; put back a copy, or {remedy}")
     return None
 
 
@@ -116,11 +122,11 @@ def _before_decay(folder: RunFolder, newest: dict[str, Any]) -> dict[str, Any]:
     log.info("%s is trained longer; what it had as its result is made again", folder.path)
     if step is None or step == newest["global_step"]:
         return newest
-    remedy = "choose another folder with run.folder=… for the longer run"
     if step == 0:
         raise ValueError(
             f"{folder.path} can not be trained longer: its learning rate decays from the first "
-            f"step on (schedule.decay_share: 1), so that no step is that of a longer run; {remedy}"
+            f"step on (schedule.decay_share: 1), so that no step is that of a longer run; "
+            f"{OTHER_FOLDER}"
         )
     path = folder.stable_checkpoint
     try:
@@ -128,7 +134,8 @@ def _before_decay(folder: RunFolder, newest: dict[str, Any]) -> dict[str, Any]:
     except (OSError, DamagedError) as error:
         raise ValueError(
             f"{folder.path} can not be trained longer: its learning rate has decayed since step "
-            f"{step}, and the checkpoint of that step can not be used ({error}); {remedy}"
+            f"{step}, and the checkpoint of that step can not be used ({error}); "
+            f"{OTHER_FOLDER}"
         ) from error
     folder.forget_result()
     write_atomically(folder.checkpoint, path.read_bytes())

@@ -3,7 +3,7 @@
 import logging
 
 from ngi.files import code_versions
-from ngi.files.code_versions import same_program, shown
+from ngi.files.code_versions import made_with, same_program, shown
 from ngi.files.run_folder import RunFolder, has_something
 
 log = logging.getLogger(__name__)
@@ -21,11 +21,13 @@ def heed_code_change(folder: RunFolder, *, on_change: str) -> None:
     """
     if on_change not in ON_CHANGE:
         raise ValueError(f"run.on_code_change: '{on_change}'; expected one of {list(ON_CHANGE)}")
-    versions = code_versions.code_versions(folder.path) if has_something(folder.path) else []
-    now = code_versions.code_version()
-    if not versions or same_program(versions[-1], now):
+    if not has_something(folder.path):
         return
-    change = f"{folder.path} was made with {shown(versions[-1])}, and this is {shown(now)}"
+    made = made_with(folder.path, last_step=folder.steps.last_step)
+    now = code_versions.code_version()
+    if made is None or same_program(made, now):
+        return
+    change = f"{folder.path} was made with {shown(made)}, and this is {shown(now)}"
     if on_change == "refuse":
         raise RuntimeError(
             f"{change}; run.on_code_change=continue keeps what is there, run.on_code_change="

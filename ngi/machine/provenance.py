@@ -78,7 +78,8 @@ def code_hash() -> str:
     """
     folder = Path(ngi.__file__).resolve().parent
     digest = hashlib.sha256()
-    modules = (f for f in folder.rglob("*.py") if f.relative_to(folder).parts[0] != DATA)
+    found = (f for f in folder.rglob("[!.]*.py") if f.is_file())  # editors leave links to nothing
+    modules = (f for f in found if f.relative_to(folder).parts[0] != DATA)
     for file in sorted(modules):
         digest.update(f"{file.relative_to(folder)}\0{file.stat().st_size}\0".encode())
         digest.update(file.read_bytes())

@@ -14,6 +14,7 @@ from ngi.clock.counters import Counters
 from ngi.clock.phase_clock import PAUSES, PHASES
 from ngi.config.build import run_components
 from ngi.learn import Component, CostFile, ModelClock
+from ngi.machine.backend import VARIANTS
 from ngi.patches import MovingPoints
 from ngi.render import AnalyticRenderer
 from tests.learn.composition import run_config
@@ -168,6 +169,13 @@ def test_costs_with_a_gpu_are_not_those_without(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
     monkeypatch.setattr(torch.cuda, "get_device_name", lambda: "Some GPU")
     assert all(key != without[name] for name, key in keys.__wrapped__().items())
+
+
+def test_costs_without_llvm_are_not_those_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    usual = keys.__wrapped__()
+    monkeypatch.setattr(AnalyticRenderer, "description", f"Mitsuba 3, {VARIANTS['scalar']}")
+    scalar = keys.__wrapped__()
+    assert {name for name, key in scalar.items() if key != usual[name]} == {"rendering"}
 
 
 def test_the_file_keeps_medians_and_quartiles(tmp_path: Path) -> None:

@@ -238,10 +238,11 @@ def test_non_finite_predictions_are_counted_and_make_the_metrics_so(evaluator) -
         if scene_vector[0] == 0:  # the first hard frame
             answer[2:4, 5] = torch.nan
             answer[0, 0] = 200.0  # expm1 overflows
+            answer[1, 1] = -torch.inf  # of which it is -1
         return answer
 
     evaluation = evaluator.evaluate(broken)
-    assert evaluation.result()["non_finite"] == {"hard": 3, "uniform": 0}
+    assert evaluation.result()["non_finite"] == {"hard": 4, "uniform": 0}
     row = evaluation.row()
     assert all(not math.isfinite(row[f"hard_{metric}"]) for metric in METRICS)
     assert all(math.isfinite(row[f"uniform_{metric}"]) for metric in METRICS)

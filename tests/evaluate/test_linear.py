@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import math
 from pathlib import Path
 
 import numpy as np
@@ -176,6 +177,24 @@ def test_a_changed_number_is_found(run: Path, capsys) -> None:
     change(run, lambda content: content["metrics"]["hard"]["dssim"].update(mean=0.01))
     assert main([f"run={run}"]) == 1
     assert "hard: dssim's mean is 0.01 in result.json" in capsys.readouterr().out
+
+
+def test_pixels_that_are_no_numbers_are_counted_exactly(run: Path, capsys) -> None:
+    file = run / "linear" / "hard_02_prediction.exr"
+    pixels = read_exr(file)
+    pixels[:10, :20] = torch.nan
+    write_exr(file, pixels)
+
+    def one_more(content: dict) -> None:
+        content["linear"] = "half"  # whose metrics may differ by a hundredth
+        (frame,) = (f for f in content["frames"] if (f["set"], f["index"]) == ("hard", 2))
+        frame.update(dict.fromkeys(("mape", "dssim", "mae", "lpips"), math.nan), non_finite=201)
+
+    change(run, one_more)
+    assert main([f"run={run}"]) == 1
+    assert "hard frame 2: non_finite is 201 in result.json, recomputed 200" in (
+        capsys.readouterr().out
+    )
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,5 @@
 import dataclasses
+import json
 
 import numpy as np
 import pytest
@@ -17,6 +18,15 @@ def test_identity_changes_with_every_field(protocol: EvaluationProtocol) -> None
         identities.add(dataclasses.replace(protocol, **{field.name: other}).identity)
     assert len(identities) == len(dataclasses.fields(protocol)) + 1
     assert dataclasses.replace(protocol).identity == protocol.identity
+
+
+def test_a_number_written_otherwise_is_the_same_protocol(protocol: EvaluationProtocol) -> None:
+    """`exposure=1` on the command line, and `1.0`."""
+    whole, pointed = (dataclasses.replace(protocol, exposure=one) for one in (1, 1.0))
+    assert whole.identity == pointed.identity
+    coarse, other = (dataclasses.replace(protocol, epsilon=one) for one in (1, 1.0))
+    assert coarse.reference_settings == other.reference_settings
+    assert json.dumps(coarse.reference_settings) == json.dumps(other.reference_settings)
 
 
 @pytest.mark.parametrize(

@@ -1,11 +1,13 @@
 import dataclasses
 import logging
+import os
 
 import numpy as np
 import pytest
 import torch
 
 from ngi.evaluate import ReferenceCache, mape, relative_noise
+from ngi.evaluate.references import Reference, read_reference
 
 V = torch.tensor([0.25, 0.5, 0.75])
 
@@ -151,6 +153,37 @@ def test_one_reference_may_be_written_twice_at_once(
         ReferenceCache(tmp_path).get(renderer, protocol, V).content_hash == reference.content_hash
     )
     assert not renderer.seeds, f"{file} was not read"
+
+
+@pytest.mark.parametrize("links", [True, False], ids=["hard links", "none"])
+def test_of_two_that_differ_both_processes_have_the_cached_one(
+    renderer, protocol, tmp_path, monkeypatch, links: bool
+) -> None:
+    """Another backend renders the same frame with other bits meanwhile."""
+    others: list[Reference] = []
+    exact = type(renderer).render_image
+
+    def brighter(*arguments: object, **named: object) -> torch.Tensor:
+        return 1.001 * exact(*arguments, **named)
+
+    def meanwhile(*arguments: object, **named: object) -> torch.Tensor:
+        if not others:
+            with monkeypatch.context() as patch:
+                patch.setattr(type(renderer), "render_image", brighter)
+                others.append(ReferenceCache(tmp_path).get(renderer, protocol, V))
+        return exact(*arguments, **named)
+
+    def no_links(*_: object) -> None:
+        raise PermissionError(1, "Operation not permitted")
+
+    if not links:
+        monkeypatch.setattr(os, "link", no_links)
+    monkeypatch.setattr(type(renderer), "render_image", meanwhile)
+    reference = ReferenceCache(tmp_path).get(renderer, protocol, V)
+    (file,) = tmp_path.iterdir()
+    cached = read_reference(file, resolution=protocol.resolution)
+    assert reference.content_hash == cached.content_hash
+    assert (others[0].content_hash == cached.content_hash) == links
 
 
 def test_pixels_that_are_sometimes_not_finite_are_left_out(

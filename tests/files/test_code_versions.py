@@ -61,6 +61,30 @@ def test_what_is_done_again_with_another_version_is_of_that_one(tmp_path: Path, 
     assert versions(tmp_path) == [("a", False, "1", 0), ("b", False, "2", 22)]
 
 
+def test_a_version_that_made_no_step_made_nothing(tmp_path: Path, caplog, program) -> None:
+    """Started by mistake, and stopped while references were prepared."""
+    program("a", "1")
+    record_code_version(tmp_path, after_step=0)
+    program("b", "2")
+    record_code_version(tmp_path, after_step=100)
+    made = code_versions.made_with(tmp_path, last_step=100)
+    assert made is not None
+    assert made["commit"][0] == "a"
+    caplog.clear()
+    program("a", "1")
+    record_code_version(tmp_path, after_step=100)
+    assert caplog.records == []
+    assert versions(tmp_path) == [("a", False, "1", 0)]
+
+
+def test_what_makes_no_steps_was_made_with_the_last_version(tmp_path: Path, program) -> None:
+    assert code_versions.made_with(tmp_path, last_step=0) is None
+    program("a", "1")
+    record_code_version(tmp_path, after_step=0)
+    made = {**code_versions.code_version(), "after_step": 0}
+    assert code_versions.made_with(tmp_path, last_step=0) == made
+
+
 def test_two_states_of_one_commit_are_told_apart(tmp_path: Path, caplog, program) -> None:
     program("a", "1", dirty=True)
     record_code_version(tmp_path, after_step=0)
@@ -94,6 +118,8 @@ def test_the_hash_is_over_the_programs_modules_and_nothing_else(tmp_path: Path, 
     (copy / "notes.txt").write_text("no module")
     (copy / "_data" / "scenes").mkdir(parents=True)
     (copy / "_data" / "scenes" / "make.py").write_text("a script beside the package, in a wheel")
+    (copy / "models" / ".#loss.py").symlink_to("someone@somewhere.1234")  # Emacs, while it edits
+    (copy / "models" / "gone.py").symlink_to("nowhere.py")
     assert code_hash() == before
     loss = copy / "models" / "loss.py"
     loss.write_text(loss.read_text().replace("1", "2", 1))

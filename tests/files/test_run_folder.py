@@ -1,3 +1,5 @@
+import errno
+import fcntl
 import hashlib
 import json
 from pathlib import Path
@@ -58,6 +60,15 @@ def test_two_processes_can_not_train_one_run(tmp_path: Path) -> None:
     with pytest.raises(RuntimeError, match="another process"):
         RunFolder(tmp_path, settings=SETTINGS)
     first.close()
+
+
+def test_a_disk_that_knows_no_locks_is_named(tmp_path: Path, monkeypatch) -> None:
+    def unknown(*_: object) -> None:
+        raise OSError(errno.ENOSYS, "Function not implemented")
+
+    monkeypatch.setattr(fcntl, "flock", unknown)
+    with pytest.raises(OSError, match=r"this disk can not lock files, .*run\.folder=…"):
+        RunFolder(tmp_path, settings=SETTINGS)
 
 
 @pytest.mark.parametrize("place", ["below a file", "in /proc"])

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import pytest
 from omegaconf import DictConfig
 
+from ngi.files.code_versions import record_code_version
 from ngi.learn.code_change import heed_code_change
 from ngi.train import train
 from tests.files.test_code_versions import program_is
@@ -79,6 +80,13 @@ def test_changed_code_can_be_refused(copy: Path, state: str) -> None:
     with pytest.raises(RuntimeError, match=r"run: .*=restart deletes it|made with commit a"):
         train(trained(copy, "refuse"))
     assert contents(copy) == before
+
+
+def test_a_version_that_was_only_started_is_not_what_a_run_was_made_with(copy: Path) -> None:
+    (copy / "run" / "result.json").unlink()
+    record_code_version(copy / "run", after_step=20)
+    with pytest.raises(RuntimeError, match=r"was made with commit aaaaaaaaaaaa"):
+        train(trained(copy, "refuse"))
 
 
 @pytest.mark.parametrize("state", ["finished", "interrupted"])

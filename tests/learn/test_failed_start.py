@@ -1,5 +1,6 @@
 """A run that cannot start gives back what it has taken: other jobs of a sweep need it."""
 
+import json
 import socket
 from pathlib import Path
 
@@ -7,9 +8,13 @@ import pytest
 from hydra.errors import InstantiationException
 
 from ngi import learn
+from ngi.learn.saving import BudgetAndCheckpoint
 from ngi.train import train
 from tests.learn.command_line import SMALL
 from tests.learn.composition import run_config
+from tests.learn.lightning_warnings import IGNORED
+
+pytestmark = IGNORED
 
 
 @pytest.fixture(autouse=True)
@@ -44,3 +49,21 @@ def test_the_port_is_free_where_the_start_fails(monkeypatch: pytest.MonkeyPatch)
     with socket.socket() as other:
         other.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         other.bind(("127.0.0.1", port))
+
+
+def test_what_a_run_that_was_never_saved_left_is_no_part_of_the_next(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Out of memory in the first minute, and begun again with fewer chains."""
+
+    def full(*_: object) -> None:
+        raise MemoryError
+
+    with monkeypatch.context() as patch:
+        patch.setattr(BudgetAndCheckpoint, "_save", full)
+        with pytest.raises(MemoryError):
+            train(run_config(*SMALL, "sampler=mcmc_loss", "sampler.chains=8"))
+    assert Path("run/chains.bin").stat().st_size > 0
+    train(run_config(*SMALL, "sampler=mcmc_loss", "sampler.chains=4"))
+    header = json.loads(Path("run/chains.bin").read_bytes().partition(b"\n")[0])
+    assert ["accepted", "|b1", [4]] in header["fields"]

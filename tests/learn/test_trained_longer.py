@@ -81,6 +81,19 @@ def test_a_run_that_is_broken_off_before_it_is_longer_is_unfinished(
     assert (again["steps"], again["metrics"]) == (40, first["metrics"])
 
 
+def test_without_a_checkpoint_it_stays_as_it_is(tmp_path: Path) -> None:
+    """As a copy of results alone."""
+    train(run(tmp_path, 40, *WSD))
+    folder = tmp_path / "run"
+    for checkpoint in folder.glob("*.ckpt"):
+        checkpoint.unlink()
+    before = {file: file.read_bytes() for file in folder.glob("*.*") if file.name != ".lock"}
+    with pytest.raises(ValueError, match=r"no checkpoint in it; put last\.ckpt back, or choose"):
+        train(run(tmp_path, 60, *WSD))
+    assert {file: file.read_bytes() for file in before} == before
+    assert (folder / "result.json") in before
+
+
 def interrupted(*_: object, **__: object) -> None:
     raise KeyboardInterrupt
 

@@ -51,6 +51,7 @@ def run_path_tracing(
     plan = instantiate(config.path_tracing)
     label = {**plain(config.label), **dict.fromkeys(UNUSED, "none"), "seed": config.seed}
     folder.begin(scene_place=scene_place(config))
+    folder.begin_logs()
     record_code_version(folder.path, after_step=0)
     tracker.start(folder=folder.path, settings=folder.settings, label=label)
     timed = _timed(config, plan, renderer)
@@ -85,9 +86,8 @@ def run_path_tracing(
 
 
 def _log(evaluation: Evaluation, *, folder: RunFolder, tracker: Tracker) -> None:
-    """The row of metrics.csv, which an interrupted run may have written before."""
+    """The row of metrics.csv."""
     row = {"step": 0, "run_seconds": 0.0, **evaluation.row()}
-    folder.metrics.keep_until(-1)
     folder.metrics.append(row)
     folder.metrics.flush()
     tracker.evaluated(row, evaluation)

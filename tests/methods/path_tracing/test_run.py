@@ -113,9 +113,14 @@ def test_a_finished_run_is_not_made_again_and_an_unfinished_one_is(runs: Path) -
     assert run(runs, "again", "method=path_tracing_8spp") == json.loads(before)
     assert file.read_bytes() == before
     file.unlink()
+    (runs / "again" / "steps.csv").write_text("step\n1\n")  # of a training that died at once
+    (runs / "again" / "metrics.csv").write_text("step,other\n0,1\n")
     assert run(runs, "again", "method=path_tracing_8spp")["frames"] == json.loads(before)["frames"]
     rows = csv.DictReader((runs / "again" / "metrics.csv").read_text().splitlines())
-    assert [row["step"] for row in rows] == ["0"]
+    (row,) = rows
+    assert row["step"] == "0"
+    assert float(row["hard_mape"]) > 0
+    assert not (runs / "again" / "steps.csv").exists()
 
 
 def test_it_stands_in_the_report_beside_trained_networks(runs: Path, tmp_path: Path) -> None:
