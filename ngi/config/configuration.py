@@ -74,6 +74,13 @@ NOT_IDENTITY = (
 )
 """Parts of the configuration that do not decide what a run computes: names, places, helpers."""
 
+
+def scene_folder(path: str) -> str:
+    """Name of the folder of a scene, which is given by that or by its XML file."""
+    place = Path(path).resolve()
+    return (place.parent if place.is_file() else place).name
+
+
 RESOLVERS: dict[str, Callable[..., Any]] = {
     "run_name": run_name,
     "said_overrides": said_overrides,
@@ -84,7 +91,7 @@ RESOLVERS: dict[str, Callable[..., Any]] = {
     "network_depth": network_depth,
     "bootstrap_batches": bootstrap_batches,
     "warmup_steps": warmup_steps,
-    "folder_name": lambda path: Path(path).name,
+    "folder_name": scene_folder,
     "absolute_path": lambda *parts: str(Path(*parts).absolute()),
     "cache_folder": lambda: str(cache_folder()),
 }

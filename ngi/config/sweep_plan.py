@@ -22,12 +22,20 @@ from tqdm import tqdm
 
 from ngi.clock.counters import Counters
 from ngi.config.build import plain, run_components, without_seed
-from ngi.config.configuration import run_settings
+from ngi.config.configuration import run_settings, scene_place
 from ngi.config.hydra_program import MESSAGES, in_plain_words
 from ngi.config.values import check_values
-from ngi.files.code_versions import code_version, code_versions, same_program
+from ngi.files.code_versions import code_version, made_with, same_program
 from ngi.files.row_log import RowLog
-from ngi.files.run_folder import RESULT, SETTINGS, has_something, kept_settings, longer
+from ngi.files.run_folder import (
+    CHECKPOINTS,
+    RESULT,
+    SETTINGS,
+    STEPS,
+    has_something,
+    kept_settings,
+    longer,
+)
 from ngi.learn import Budget, CostFile, ModelClock
 
 
@@ -110,7 +118,9 @@ def planned_run(config: DictConfig, costs: dict[str, float | None]) -> Planned:
         return Planned(folder, f"cannot start: {why}", 0.0, None)
     if state == "finished":
         done, left = 1.0, 0.0
+    # Two scenes of one name are told apart by where they lie, before they are read.
     settings = {**run_settings(config, scene_hash="", costs=None), "budget": None}
+    settings["scene"] |= {"place": scene_place(config)}
     return Planned(folder, state, done, left, settings=json.dumps(settings))
 
 
@@ -127,8 +137,10 @@ def _state(config: DictConfig, folder: Path) -> str:
         return "new"
     there = kept_settings(folder)
     is_longer = there is not None and _is_longer(config, there, folder)
-    versions = code_versions(folder)
-    if versions and not same_program(versions[-1], code_version()):
+    if is_longer and not any((folder / name).exists() for name in CHECKPOINTS):
+        raise ValueError("it can not be trained longer: there is no checkpoint in its folder")
+    made = made_with(folder, last_step=RowLog(folder / STEPS).last_step)
+    if made is not None and not same_program(made, code_version()):
         if config.run.on_code_change == "restart":
             return "again"
         if config.run.on_code_change == "refuse":
@@ -152,7 +164,7 @@ def _is_longer(config: DictConfig, there: Any, folder: Path) -> bool:
 
 
 def _done(folder: Path, budget: Budget) -> float:
-    last = RowLog(folder / "steps.csv").last_row
+    last = RowLog(folder / STEPS).last_row
     if last is None:
         return 0.0
     return min(

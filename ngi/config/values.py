@@ -30,6 +30,9 @@ _BESIDE: dict[str, Any] = {
 """Kinds of values that are no argument of a class."""
 
 
+OWN_OPTIONS = ("evaluation", "reuse", "scene")
+"""Groups whose options have no class, but keys of their own."""
+
 _OF_STUDIES = ("ceiling",)
 """Keys that an experiment adds for what is started by another command."""
 
@@ -58,24 +61,33 @@ def check_values(config: DictConfig) -> None:
 
 
 def _check_keys(config: DictConfig) -> None:
-    """Of the whole and of `run`; the parts with a class are checked where they are made."""
-    known_in_all, known_in_run = _known_keys()
-    for path, node, known in (("", config, known_in_all), ("run.", config.run, known_in_run)):
+    """Of the whole and of what has no class; the parts with one are checked where they are made."""
+    for name, known in _known_keys().items():
+        node, path = (config[name], f"{name}.") if name else (config, "")
         for key in node:
             if key not in known:
                 near = get_close_matches(str(key), {*known, "sweeps"}, n=1, cutoff=0.8)
-                name = "+sweeps" if near == ["sweeps"] else "".join([path, *near])
-                meant = f"; did you mean '{name}'?" if near else "; leave it out"
+                if name in OWN_OPTIONS and not near:
+                    continue  # an option of one's own may keep values for others to refer to
+                right = "+sweeps" if near == ["sweeps"] else "".join([path, *near])
+                meant = f"; did you mean '{right}'?" if near else "; leave it out"
                 raise ValueError(f"{path}{key!s}: nothing reads this key{meant}")
 
 
 @cache
-def _known_keys() -> tuple[set[str], set[str]]:
-    """Of the whole configuration and of `run`; read once, however many runs a sweep has."""
+def _known_keys() -> dict[str, set[str]]:
+    """Of the whole configuration, '', and of the parts without a class, by their names.
+
+    Read once, however many runs a sweep has.
+    """
     conf = root() / "conf"
     base = OmegaConf.load(conf / "train.yaml")
     groups = {folder.name for folder in conf.iterdir() if folder.is_dir()}
-    return {*map(str, base), *groups, *_OF_STUDIES}, set(map(str, base.run))
+    known = {"": {*map(str, base), *groups, *_OF_STUDIES}, "run": set(map(str, base.run))}
+    for group in OWN_OPTIONS:
+        options = [OmegaConf.load(file) for file in (conf / group).glob("*.yaml")]
+        known[group] = {str(key) for option in options for key in option}
+    return known
 
 
 def _arguments(node: DictConfig, path: str) -> Iterator[tuple[str, Any, Any]]:

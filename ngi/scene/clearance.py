@@ -142,7 +142,7 @@ def out_of_bounds(scene: VariableScene) -> list[str]:
         hidden = scene.description.hidden(v)
         for shape, instance in scene.placed():
             name = shape.id() if instance is None or instance.id() == STATIC else instance.id()
-            if name not in hidden:
+            if not {name, shape.id()} & set(hidden):
                 points = _outline(shape, instance)
                 out = float(np.maximum(low - points, points - high).max())
                 farthest[name] = max(farthest.get(name, 0.0), out)

@@ -81,8 +81,9 @@ class Parameters:
 
         of: Mitsuba's classes of what can have it; all where empty.
 
-        Raises ValueError for an id that the scene does not have, with ids that look like it, and
-        for an object without such a parameter, with the parameters that it has.
+        Raises ValueError for an id that the scene does not have, with ids that look like it, for
+        an object without such a parameter, with the parameters that it has, and for one of several
+        parts that have it alike, with these.
         """
         owner = self.object(object_id)
         keys = [
@@ -95,6 +96,12 @@ class Parameters:
             matches = [key for key in matches if not of or self.owner(key).class_name() in of]
             if matches:
                 found: str = min(matches, key=lambda key: key.count("."))
+                alike = [key for key in matches if key.count(".") == found.count(".")]
+                if len(alike) > 1:
+                    raise ValueError(
+                        f"{self._file}: '{object_id}' ({owner.class_name()}) has several "
+                        f"{suffix}: {alike}; give an id to the part that is meant, and name that"
+                    )
                 self._found.add(found)
                 return found
         varies = f" that varies, as a {' or '.join(of)} has" if of else ""

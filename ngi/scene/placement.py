@@ -42,11 +42,15 @@ class Placement:
     Steps are set one by one; `flush` writes what came of them, once.
 
     parking: the matrix that takes an object out of sight, see `parking`.
+    turned: whether it is part of a group that an instance turns or scales
     """
 
-    def __init__(self, body: Body, *, parking: transforms.Matrix | None) -> None:
+    def __init__(
+        self, body: Body, *, parking: transforms.Matrix | None, turned: bool = False
+    ) -> None:
         self._body = body
         self._parking = parking
+        self._turned = turned
         self._steps: list[tuple[int, transforms.Matrix]] = []
         self._changed = False
 
@@ -62,6 +66,11 @@ class Placement:
 
     def step(self, *, last: bool = False) -> Write:
         """A function that sets a matrix [4, 4] of this variable's own, in world space."""
+        if self._turned:
+            raise ValueError(
+                f"scene.yaml: {self._body.key} is part of a group that an instance turns or scales "
+                "and would not move along the world's axes; name the instances"
+            )
         return self._slot(order=1 if last else 0)
 
     def switch(self) -> Write:

@@ -175,6 +175,8 @@ def integrator_max_depth(scene: SceneFile) -> int:
     integrator = scene.root.find("integrator")
     if integrator is None:
         raise ValueError(f"{scene.path}: no <integrator>; add one, <integrator type='path'>")
+    while (inner := integrator.find("integrator")) is not None:  # in an 'aov', say
+        integrator = inner
     hidden = integrator.find("boolean[@name='hide_emitters']")
     if hidden is not None and hidden.get("value", "").lower() == "true":
         raise ValueError(f"{scene.path}: hide_emitters is true, set it to false: emitters show")

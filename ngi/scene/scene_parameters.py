@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from ngi.machine.backend import mi
 from ngi.scene.assets import Bitmap, load_vertices
 from ngi.scene.parameters import Parameters
@@ -19,6 +21,9 @@ from ngi.scene.placement import (
 )
 from ngi.scene.scene_files import SceneFile
 from ngi.scene.variable import Values, Write
+
+EMISSIONS = ("radiance.value", "intensity.value", "irradiance.value", "scale")
+"""Parameters of emitters whose factor `intensity` is, in the order in which they are looked for."""
 
 
 def has_surface(shape: mi.Shape) -> bool:
@@ -69,8 +74,15 @@ class SceneParameters(Parameters):
             )
         if body.key not in self._placements:  # a group has that of what is in it
             parked = None if emits(owner) else parking(self._size)
-            self._placements[body.key] = Placement(body, parking=parked)
+            turned = self._turned(owner)
+            self._placements[body.key] = Placement(body, parking=parked, turned=turned)
         return self._placements[body.key]
+
+    def _turned(self, owner: mi.Object) -> bool:
+        """Whether it is in a group that an instance turns or scales: along other axes."""
+        instances = [one for group, one in self.groups() if self.belongs_to(owner, group)]
+        places = [np.array(mi.traverse(one)["to_world"].matrix) for one in instances]
+        return any(not np.allclose(p.reshape(4, 4)[:3, :3], np.eye(3)) for p in places)
 
     def _body(self, object_id: str, owner: mi.Object) -> Body:
         # Not every mi.Mesh is one of vertices: a rectangle has a to_world.
@@ -107,8 +119,7 @@ class SceneParameters(Parameters):
 
     def _emission(self, object_id: str) -> Emission:
         hint = "name an emitter, or the shape that carries it, with a constant radiance"
-        names = ("radiance.value", "intensity.value", "irradiance.value", "scale")
-        key = self.find(object_id, names, hint=hint)
+        key = self.find(object_id, EMISSIONS, hint=hint)
         if key.endswith(".scale") and not isinstance(self.owner(key), mi.Emitter):
             raise ValueError(f"{self._file}: {key} of '{object_id}' is no emitter's; {hint}")
         if key not in self._emissions:  # which may be known by its own id and by its shape's

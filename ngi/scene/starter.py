@@ -12,6 +12,8 @@ import yaml
 
 from ngi.machine.backend import mi
 from ngi.scene.scene_files import SceneFile, integrator_max_depth
+from ngi.scene.scene_parameters import EMISSIONS
+from ngi.scene.transforms import thickened
 
 FACTOR = ", minimum: 0.5, maximum: 2"
 _AUTOMATIC_ID = re.compile(r"^(_|object_\d|[a-z]+_0x|__)")
@@ -58,7 +60,7 @@ def starter_yaml(document: SceneFile, scene: mi.Scene, found: list[Candidate]) -
     document: the Mitsuba file, from which scene was loaded; found: its candidates.
     """
     folder_name = document.path.resolve().parent.name
-    low, high = _bounds(scene)
+    low, high = thickened(*map(np.array, _bounds(scene)))
     active = next((c for c in found if c.property == "look_at"), found[0] if found else None)
     if active is None:
         raise ValueError(f"{document.path}: no object with an id can vary; give ids to its objects")
@@ -103,16 +105,19 @@ def _entries(node: mi.Object, scene: mi.Scene) -> dict[str, str]:
         "rotation": ", axis: [0, 1, 0], minimum: -30, maximum: 30",
         "scale": ", minimum: 0.8, maximum: 1.2",
     }
-    return entries | ({"intensity": FACTOR} if node.is_emitter() else {"visibility": ""})
+    return entries | (_brightness(node.emitter()) if node.is_emitter() else {"visibility": ""})
 
 
 def _light(emitter: mi.Emitter, step: float) -> dict[str, str]:
     kind = emitter.class_name()
     if kind == "DirectionalEmitter":
         return {"direction": ", minimum: [0, 20], maximum: [90, 60]", "intensity": FACTOR}
+    turned = {"rotation": ", axis: [0, 1, 0], minimum: 0, maximum: 360"}
     if kind == "EnvironmentMapEmitter":
-        return {"rotation": ", axis: [0, 1, 0], minimum: 0, maximum: 360", "intensity": FACTOR}
-    entries = {"intensity": FACTOR}
+        return {**turned, "intensity": FACTOR}
+    if "sky" in kind.lower():
+        return turned
+    entries = _brightness(emitter)
     if kind in ("PointLight", "SpotLight", "Projector"):
         entries["translation"] = _offsets(step)
     if kind in ("SpotLight", "Projector"):
@@ -122,6 +127,12 @@ def _light(emitter: mi.Emitter, step: float) -> dict[str, str]:
         wider = min(1.5 * cutoff, 180)
         entries["cone"] = f", minimum: {_list([cutoff, beam])}, maximum: {_list([wider, beam])}"
     return entries
+
+
+def _brightness(emitter: mi.Emitter) -> dict[str, str]:
+    """Of what emits the same everywhere; a bitmap of radiance has no factor."""
+    constant = any(key in mi.traverse(emitter) for key in EMISSIONS)
+    return {"intensity": FACTOR} if constant else {}
 
 
 def _aims(emitter: mi.Emitter) -> str:
@@ -174,9 +185,10 @@ def _views(sensor: mi.Sensor, scene: mi.Scene) -> str:
     distance = np.linalg.norm(high - low) / 3
     origin, target = to_world[:3, 3], to_world[:3, 3] + distance * to_world[:3, 2]
     reach = np.array([*(high - low) / 20, *(high - low) / 20])
-    reach[4] = 0  # the target's height stays, as in the paper's scenes
+    upright = abs(to_world[1, 1]) > 0.1
+    reach[4 if upright else 5] = 0  # the target's height stays, as in the paper's scenes
     view = np.concatenate([origin, target])
-    up = "" if abs(to_world[1, 1]) > 0.1 else ", up: [0, 0, 1]"
+    up = "" if upright else ", up: [0, 0, 1]"
     return f", minimum: {_list(view - reach)}, maximum: {_list(view + reach)}{up}"
 
 

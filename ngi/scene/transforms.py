@@ -59,3 +59,12 @@ def look_at(
     matrix = np.eye(4)
     matrix[:3, :] = np.column_stack([left, np.cross(forward, left), forward, origin])
     return matrix
+
+
+def thickened(
+    low: NDArray[np.float64], high: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """A box with corners [3], thicker by a thousandth of its diagonal where it is flat."""
+    diagonal = np.linalg.norm(high - low)
+    flat = 5e-4 * diagonal * (high - low < 1e-6 * diagonal)
+    return low - flat, high + flat

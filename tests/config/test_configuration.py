@@ -123,3 +123,14 @@ def test_the_authors_scenes_are_named_after_their_folder() -> None:
     assert config.scene.name == "release-bedroom"
     assert config.renderer.scene.path == "/some/where/bedroom"
     assert config.renderer.scene["_target_"] == "ngi.scene.release.read_release"
+
+
+@pytest.mark.parametrize("given", [".", "scene.xml", "../bedroom"])
+def test_so_they_are_however_the_folder_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, given: str
+) -> None:
+    folder = tmp_path / "bedroom"
+    folder.mkdir()
+    (folder / "scene.xml").touch()
+    monkeypatch.chdir(folder)
+    assert composed("scene=release", f"scene.path={given}").scene.name == "release-bedroom"

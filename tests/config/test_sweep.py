@@ -134,6 +134,27 @@ def test_what_cannot_start_is_named_beforehand(finished: tuple[Path, str]) -> No
     assert contents(place) == before
 
 
+def test_what_has_no_checkpoint_can_not_be_planned_longer(
+    finished: tuple[Path, str], tmp_path: Path
+) -> None:
+    place = tmp_path / "copy"
+    shutil.copytree(finished[0], place)
+    for checkpoint in place.rglob("*.ckpt"):
+        checkpoint.unlink()
+    words = ("seed=0", "optimizer.lr=1e-3", "budget.steps=24")
+    status, output = sweep(place, *words, options=("-m", "--dry-run"))
+    assert status == 1
+    assert "cannot start: it can not be trained longer: there is no checkpoint" in output
+
+
+def test_scenes_of_two_names_are_two_runs(tmp_path: Path) -> None:
+    """Closed formulas are the same whatever the scene is called, and a run is not."""
+    words = ("seed=0", "scene=mirror,cornell-box")
+    status, output = sweep(tmp_path, *words, options=("-m", "--dry-run"))
+    assert status == 1
+    assert "an earlier run of this sweep has its folder" in output
+
+
 def test_a_plan_names_values_and_folders_with_which_runs_cannot_start(tmp_path: Path) -> None:
     status, output = sweep(tmp_path, "sampler.chains=4,0", options=("-m", "--dry-run"))
     assert status == 1, output

@@ -159,6 +159,9 @@ def test_a_value_of_the_wrong_kind_is_named(key, value, said) -> None:
         ("sweep", "sweep: nothing reads this key; did you mean '+sweeps'?"),
         ("sampelr", "sampelr: nothing reads this key; did you mean 'sampler'?"),
         ("run.chekpoint_seconds", "…; did you mean 'run.checkpoint_seconds'?"),
+        ("evaluation.cuont", "…; did you mean 'evaluation.count'?"),
+        ("reuse.when_lat", "…; did you mean 'reuse.when_late'?"),
+        ("scene.reeder", "…; did you mean 'scene.reader'?"),
         ("supersampled_edges", "supersampled_edges: nothing reads this key; leave it out"),
     ],
 )
@@ -168,6 +171,12 @@ def test_a_key_that_nothing_reads_is_refused(key: str, said: str) -> None:
     OmegaConf.update(config, key, 3, force_add=True)
     with pytest.raises(ValueError, match=f"{re.escape(said.lstrip('…'))}$"):
         check_values(config)
+
+
+def test_an_option_of_ones_own_may_keep_values_for_others_to_refer_to() -> None:
+    config = base(0).copy()
+    OmegaConf.update(config, "scene.year", 1843, force_add=True)
+    check_values(config)
 
 
 def test_what_experiments_and_sweeps_add_is_no_such_key() -> None:

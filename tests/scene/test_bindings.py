@@ -60,6 +60,12 @@ def second_camera(root) -> None:
     root.append(other)
 
 
+def two_sides(root) -> None:
+    other = copy.deepcopy(find(root, "blue"))
+    del other.attrib["id"]
+    find(root, "white").append(other)
+
+
 def nameless(root) -> None:
     second_camera(root)
     del find(root, "camera").attrib["id"]
@@ -115,7 +121,17 @@ def other_mesh(folder) -> None:
             {"edit": bumpy},
         ),
         ({"object": "picture", **ALBEDO}, "name a BSDF whose reflectance is given as <rgb>", {}),
+        (
+            {"object": "white", **ALBEDO},
+            r"'white' \(TwoSided.*\) has several .*brdf_0.*brdf_1.*; give an id to the part",
+            {"edit": two_sides},
+        ),
         ({"object": "paint", **TURN}, "'paint' .* it has no place that could vary", {}),
+        (
+            {"object": "wedge_mesh", **MOVE},
+            "wedge_mesh.* a group that an instance turns or scales .*; name the instances",
+            {},
+        ),
         ({"object": "light", **HIDE}, "an emitter cannot be hidden", {}),
         ({"object": "globe", **HIDE}, "an emitter cannot be hidden", {}),
         (
@@ -266,6 +282,8 @@ def test_a_group_and_what_is_in_it_are_moved_as_one(make_scene) -> None:
         root.remove(ball)
         group.append(ball)
         instance = ElementTree.SubElement(root, "shape", type="instance", id="shown")
+        place = ElementTree.SubElement(instance, "transform", name="to_world")
+        ElementTree.SubElement(place, "translate", x="0.5")  # along the same axes
         ElementTree.SubElement(instance, "ref", id="ball_group")
 
     scene = VariableScene(read_scene(make_scene("stage", entries, dimensions=2, edit=edit)))

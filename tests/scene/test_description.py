@@ -185,6 +185,12 @@ def test_merged_keys_may_be_overridden(tmp_path) -> None:
             '<integrator type="path">\n<boolean name="hide_emitters" value="True"/>',
             "hide_emitters is true",
         ),
+        (
+            '<integrator type="path">',
+            '<integrator type="aov"><integrator type="path"><boolean name="hide_emitters" '
+            'value="true"/></integrator></integrator><integrator type="path" name="unused">',
+            "hide_emitters is true",
+        ),
         ("integrator", "x", "not well-formed XML"),
         (
             'name="max_depth" value="4"',

@@ -43,6 +43,24 @@ def test_film_becomes_square_with_the_field_of_view_of_its_width(tmp_path, caplo
     assert "32 x 16" in caplog.text
 
 
+@pytest.mark.parametrize(
+    ("axis", "width", "kept"),
+    [
+        ("x", 32, "width"),
+        ("y", 32, "height"),
+        ("smaller", 32, "height"),
+        ("larger", 32, "width"),
+        ("smaller", 8, "width"),
+        ("larger", 8, "height"),
+    ],
+)
+def test_which_field_of_view_is_kept_is_said(tmp_path, caplog, axis, width, kept) -> None:
+    sensor = SENSOR.replace('name="width" value="16"', f'name="width" value="{width}"')
+    sensor = sensor.replace("<film", f'<string name="fov_axis" value="{axis}"/><film')
+    read(tmp_path, BALL + LAMP, sensor=sensor)
+    assert f"with the field of view of its {kept}" in caplog.text
+
+
 def test_samples_per_pixel_are_the_samplers(tmp_path) -> None:
     assert read(tmp_path, BALL + LAMP).samples_per_pixel == 8
     bare = '<sensor type="perspective"/>'

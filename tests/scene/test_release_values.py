@@ -106,6 +106,36 @@ def test_colour_of_a_bsdf(tmp_path, kind, authored, key) -> None:
     assert_allclose(np.array(parameters[name]).reshape(-1), (0.6, 0.325, 0.3), rtol=1e-6)
 
 
+@pytest.mark.parametrize("kind", ["dielectric", "thindielectric", "roughdielectric"])
+def test_the_colour_of_glass_is_that_of_its_reflection(tmp_path, kind) -> None:
+    """What it transmits stays as it is."""
+    authored = '<rgb name="specular_transmittance" value="0.9, 0.8, 0.7"/>'
+    body = WALL.format(kind, authored + tags(3, "0.1, 0.2, 0.3", "0.5, 0.25, 0"))
+    parameters = Loaded(read(tmp_path, body)).at(1, 0.5, 1)
+    for name, expected in (
+        ("specular_reflectance", (0.6, 0.325, 0.3)),
+        ("specular_transmittance", (0.9, 0.8, 0.7)),
+    ):
+        (key,) = [k for k in parameters.keys() if k.endswith(f"{name}.value")]  # noqa: SIM118
+        assert_allclose(np.array(parameters[key]).reshape(-1), expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"), [("principled", "base_color"), ("roughconductor", "specular_reflectance")]
+)
+def test_whatever_is_a_bitmap_has_a_factor(tmp_path, kind, name) -> None:
+    image = np.full((4, 4, 3), 0.5, dtype=np.float32)
+    mi.Bitmap(image).write(str(tmp_path / "grey.exr"))
+    file = '<string name="filename" value="grey.exr"/>'
+    texture = f'<texture type="bitmap" name="{name}">{file}</texture>'
+    parameters = Loaded(
+        read(tmp_path, WALL.format(kind, texture + tags(3, "0, 0, 0", "1, 1, 1")))
+    ).at(1, 0.5, 0)
+    (key,) = [k for k in parameters.keys() if k.endswith(f"{name}.data")]  # noqa: SIM118
+    found = np.array(parameters[key]).reshape(-1, 3)
+    assert_allclose(found, np.broadcast_to([0.5, 0.25, 0], found.shape), atol=1e-6)
+
+
 @pytest.mark.parametrize("kind", ["roughconductor", "roughdielectric", "roughplastic"])
 @pytest.mark.parametrize("authored", ['<float name="alpha" value="0.01"/>', ""])
 def test_roughness_of_a_bsdf_is_the_fourth_number(tmp_path, kind, authored) -> None:

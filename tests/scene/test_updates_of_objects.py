@@ -44,7 +44,6 @@ TRANSLATIONS = [
         ("an emitting rectangle", "light"),
         ("a mesh", "curtain"),
         ("an emitting mesh", "globe"),
-        ("a mesh in a group", "wedge_mesh"),
     )
 ]
 

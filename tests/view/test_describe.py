@@ -165,6 +165,18 @@ def test_what_is_hidden_or_a_part_of_what_moves_is_in_bounds(room, capsys) -> No
     assert ["'box' reaches" in line for line in notes["-3"]] == [True]
 
 
+def test_what_is_hidden_within_a_group_is_in_bounds(room, capsys) -> None:
+    folder = room(FREE, "{object: part, property: visibility}")
+    text = (folder / "scene.xml").read_text()
+    box = """<shape type="shapegroup" id="box_group"><shape type="sphere" id="part">
+        <float name="radius" value="0.1"/></shape></shape>
+        <shape type="instance" id="box"><transform name="to_world"><translate y="3"/></transform>
+        <ref id="box_group"/></shape>"""
+    (folder / "scene.xml").write_text(text.replace("</scene>", box + "</scene>"))
+    assert main([str(folder), "backend=scalar"]) == 0
+    assert "'box' reaches" not in capsys.readouterr().out
+
+
 def test_what_turns_reaches_no_farther_than_it_does(room, capsys) -> None:
     """The corners of its box would; and instances need no id."""
     points = [[x, 0, z] for x, z in ((3.9, 0), (0, 3.9), (-3.9, 0), (0, -3.9))]
@@ -217,6 +229,34 @@ def test_a_plain_file_becomes_a_variable_scene(room, given, capsys) -> None:
     before = (folder / "scene.yaml").read_text()
     assert main([str(folder / "scene.xml"), "backend=scalar"]) == 0
     assert (folder / "scene.yaml").read_text() == before, "an existing scene.yaml was overwritten"
+
+
+OPEN = """<scene version="3.0.0"><integrator type="path"/>
+<sensor type="perspective" id="camera"><transform name="to_world">
+  <lookat origin="0,-3,1" target="0,0,1" up="0,0,1"/></transform>
+  <film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="8"/></film>
+</sensor>
+<emitter type="sunsky" id="sky"/>
+<shape type="rectangle" id="ground"/>
+<shape type="rectangle" id="screen"><emitter type="area"><texture type="checkerboard"
+  name="radiance"/></emitter></shape>
+</scene>"""
+
+
+def test_of_a_flat_scene_under_the_sky_every_candidate_works(tmp_path) -> None:
+    """The sky turns and has no intensity, nor has what glows by a texture; z is up."""
+    document = tmp_path / "scene.xml"
+    document.write_text(OPEN)
+    assert main([str(document), "backend=scalar"]) == 0
+    starter = (tmp_path / "scene.yaml").read_text()
+    assert "object: sky, property: rotation" in starter
+    assert "intensity" not in starter
+    (tmp_path / "scene.yaml").write_text(starter.replace("  # - ", "  - "))
+    scene = VariableScene(read_scene(tmp_path))
+    scene.apply([0.5] * scene.description.dimensions)
+    (view,) = [v for v in scene.description.variables if v.kind == "look_at"]
+    assert view.minimum[5] == view.maximum[5]
+    assert view.minimum[4] < view.maximum[4]
 
 
 def test_a_scene_yaml_is_its_folder(room, capsys) -> None:

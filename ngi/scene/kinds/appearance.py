@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from math import inf
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -40,11 +40,12 @@ class Albedo(RangedVariable):
     affects = frozenset({"albedo"})
     numbers = ("r", "g", "b")
     limits = (0.0, 1.0)
+    reflectances: ClassVar[tuple[str, ...]] = _REFLECTANCES
 
     def bind_one(self, scene: LoadedScene, object_id: str) -> Write:
         key = scene.parameter(
             object_id,
-            tuple(f"{name}.value" for name in _REFLECTANCES),
+            tuple(f"{name}.value" for name in self.reflectances),
             hint="name a BSDF whose reflectance is given as <rgb>, not as a texture",
         )
         if (count := scene.read(key).size) != 3:

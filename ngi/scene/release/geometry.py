@@ -54,9 +54,7 @@ def scene_box(source: Source, motions: dict[Element, Motion]) -> Box:
     if not corners:
         raise source.error(source.root, "no shape, so that there is nothing to see")
     points = np.concatenate(corners)
-    low, high = points.min(axis=0), points.max(axis=0)
-    flat = 5e-4 * np.linalg.norm(high - low) * (high - low < 1e-6 * np.linalg.norm(high - low))
-    return low - flat, high + flat
+    return transforms.thickened(points.min(axis=0), points.max(axis=0))
 
 
 def _corners(source: Source, shape: Element, motion: Motion | None) -> Values:

@@ -4,10 +4,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ngi.scene.kinds import Shape
+from ngi.scene.kinds import Albedo, Shape
 from ngi.scene.variable import LoadedScene, RangedVariable, Write
 
 NOTHING = "nothing"
+
+TINTED = ("base_color", "diffuse_reflectance", "reflectance", "specular_reflectance")
+"""What can be a bitmap with a factor; of a plastic the first, as where it has none."""
+
+
+@dataclass(frozen=True)
+class SpecularReflectance(Albedo):
+    """Of a dielectric, which may have a transmittance beside it, that stays."""
+
+    reflectances = ("specular_reflectance",)
 
 
 @dataclass(frozen=True)
@@ -25,7 +35,7 @@ class Tint(RangedVariable):
     def bind_one(self, scene: LoadedScene, object_id: str) -> Write:
         key = scene.parameter(
             object_id,
-            tuple(f"{name}.data" for name in ("diffuse_reflectance", "reflectance")),
+            tuple(f"{name}.data" for name in TINTED),
             hint="only bitmaps can be tinted",
         )
         bitmap = scene.bitmap(key)

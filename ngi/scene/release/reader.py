@@ -70,7 +70,8 @@ def rewrite_sensor(source: Source) -> int:
     size = {name: _size(source, film, name) for name in ("width", "height")}
     width, height = (source.integer(element) for element in size.values())
     if width != height:
-        kept = "its height" if _fov_axis(sensor) == "y" else "its width"
+        vertical = {"y": True, "smaller": height < width, "larger": height > width}
+        kept = "its height" if vertical.get(_fov_axis(sensor)) else "its width"
         source.warn(
             film,
             f"{width} x {height} pixels; it becomes square, with the field of view of {kept}",
@@ -101,7 +102,7 @@ def _fov_axis(sensor: Element) -> str:
     return "x" if axis is None else axis.get("value", "")
 
 
-RULES_VERSION = 2
+RULES_VERSION = 3
 """Counts changes of how the tags are read: references of a scene read otherwise are not reused."""
 
 

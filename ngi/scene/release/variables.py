@@ -5,7 +5,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from ngi.scene.kinds import Albedo, LookAt, Material, Radiance, Rotation, Roughness
 from ngi.scene.release.geometry import Box
-from ngi.scene.release.kinds import Tint
+from ngi.scene.release.kinds import SpecularReflectance, Tint
 from ngi.scene.release.objects import Objects
 from ngi.scene.release.tags import Tags, is_variable
 from ngi.scene.variable import Variable
@@ -83,7 +83,8 @@ def _colour(objects: Objects, bsdf: Element, tags: Tags) -> Variable:
             name = _COLOURS[inner.attrib["type"]]
             value = ", ".join(str((a + b) / 2) for a, b in zip(low, high, strict=True))
             SubElement(inner, "rgb", {"name": name, "value": value})
-    return Albedo(ids, low, high)
+    dielectric = any("dielectric" in inner.attrib["type"] for inner in inners)
+    return (SpecularReflectance if dielectric else Albedo)(ids, low, high)
 
 
 def _roughness(bsdf: Element, inner: Element, tags: Tags) -> Variable:
