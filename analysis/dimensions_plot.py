@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 
 from analysis.claims import CLAIMS, SALONS
 from analysis.curves import common_times, error_curve
+from analysis.methods import title
 from analysis.pairs import pair_runs
 from analysis.plots import STYLE, add_legend, draw_band, new_figure, save_figure
 from analysis.runs import METRICS, Run
@@ -31,12 +32,12 @@ def write_dimensions_figures(runs: Sequence[Run], folder: Path) -> list[Path]:
     """Writes `dimensions.png`, `ours_dimensions.png` and `.svg` of the claims that have runs."""
     files = []
     for claim in claims_with_salons(runs):
-        exploration, uniform = COMPARED[claim]
+        exploration, uniform = map(title, COMPARED[claim])
         with matplotlib.rc_context(STYLE):
             figure = dimensions_figure(runs, METRICS, claim)
             figure.suptitle(
-                f"error of {uniform} minus error of {exploration}, hard frames "
-                "(band: 95 % interval)",
+                f"error of {uniform} minus error of {exploration}, hard frames: "
+                "above 0 exploration is better (band: 95 % interval)",
                 fontsize=10,
             )
             files += save_figure(figure, folder, claim)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -47,7 +48,7 @@ def comparison_warnings(runs: Sequence[Run]) -> list[str]:
     for what, value in (
         ("were made with different commits", _commits),
         ("were timed by different clocks", _clock),
-        ("come from different machines", _machine),
+        ("come from different machines", partial(_machine, parts=_machine_parts(runs))),
     ):
         first: dict[str, Path] = {}
         for run in runs:
@@ -119,6 +120,14 @@ def _one_program(runs: Sequence[Run]) -> bool:
     return len(codes) == 1 and None not in codes
 
 
-def _machine(run: Run) -> str:
+def _machine_parts(runs: Sequence[Run]) -> list[str]:
+    """By what machines are told apart: what all runs have kept of theirs."""
+    machines = [run.result.get("machine", {}) for run in runs]
+    added = [part for part in ("cores", "gpu") if all(part in machine for machine in machines)]
+    return ["processor", "backend", *added]
+
+
+def _machine(run: Run, *, parts: Sequence[str]) -> str:
     machine = run.result.get("machine", {})
-    return f"{machine.get('processor')}, {machine.get('backend')}"
+    shown = {**machine, "cores": f"{machine.get('cores')} cores"}
+    return ", ".join(str(shown.get(part)) for part in parts if part != "gpu" or shown["gpu"])

@@ -81,5 +81,6 @@ def _effective_per_thousand(trace: ChainTrace, series: np.ndarray | None) -> flo
 
 
 def _text(values: Sequence[float]) -> str:
-    known = [value for value in values if math.isfinite(value)]
-    return format_estimate(estimate(known)) if known else MISSING
+    """Of the runs together; a value that is not known of one is not known of them."""
+    known = all(math.isfinite(value) for value in values)
+    return format_estimate(estimate(list(values))) if known else MISSING

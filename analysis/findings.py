@@ -17,6 +17,7 @@ from analysis.pairs import (
     log_errors,
     log_ratios,
     pair_runs,
+    runs_of_one_budget,
     runs_of_one_way,
     shared_metrics,
 )
@@ -109,6 +110,7 @@ def many_variables_are_plausible(runs: Sequence[Run], ours: Methods = PAPERS) ->
     the interval is Bonferroni's for as many tests as there are scenes.
     """
     method = ours.get(METHOD, METHOD)
+    runs = runs_of_one_budget(runs, [(scene, (method,)) for scene in ("chess", *SEVEN_SCENES)])
     chess = _runs_of(runs, "chess", method)
     if not chess:
         return []

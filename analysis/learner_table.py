@@ -53,7 +53,8 @@ PAGES = {
 def learner_table(results: pd.DataFrame, metrics: Sequence[str], methods: Sequence[str]) -> str:
     """A row per scene: errors on its hard frames, the lowest of each metric in bold.
 
-    results: the report's table of results; only scenes that have every method are shown
+    results: the report's table of results; only scenes that have every method are shown, with the
+        number of seeds, of each method where they have not as many
     """
     columns = {**METHODS, **{name: column for name, (_, column) in VARIANTS.items()}}
     heads = ["scene", "seeds", *(columns[method] for method in methods)]
@@ -67,8 +68,9 @@ def learner_table(results: pd.DataFrame, metrics: Sequence[str], methods: Sequen
         ).round(3)
         shown = errors.map(lambda value: f"{value:.3f}")
         shown = shown.where(errors.ne(errors.min(axis=1), axis=0), "**" + shown + "**")
-        seeds = len(str(rows.loc[(scene, methods[0]), "seeds"]).split())
-        lines.append(markdown_row([scene, str(seeds), *(" / ".join(shown[m]) for m in methods)]))
+        counts = [str(len(str(rows.loc[(scene, m), "seeds"]).split())) for m in methods]
+        seeds = counts[0] if len(set(counts)) == 1 else ", ".join(counts)
+        lines.append(markdown_row([scene, seeds, *(" / ".join(shown[m]) for m in methods)]))
     return "\n".join(lines)
 
 

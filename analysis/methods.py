@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from analysis.runs import DISTINCTIONS, Run
@@ -85,6 +85,21 @@ def methods_in_order(runs: Sequence[Run]) -> list[str]:
 
 def is_baseline(method: str) -> bool:
     return method.split(", ")[0] == BASELINE
+
+
+def baselines(budgets: Mapping[str, object]) -> list[tuple[str, str]]:
+    """Every other method beside its baseline: uniform sampling where that was run, else the first.
+
+    budgets: by method, in order; each method has the baseline of its own budget, where there is one
+    """
+    named = [method for method in budgets if is_baseline(method)]
+    if not named:
+        named = [*{budgets[method]: method for method in reversed([*budgets])}.values()][::-1]
+    found = []
+    for method, budget in budgets.items():
+        own = [baseline for baseline in named if budgets[baseline] == budget]
+        found.append((method, (own or named)[0]))
+    return [(method, baseline) for method, baseline in found if method != baseline]
 
 
 def title(method: str) -> str:

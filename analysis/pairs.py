@@ -53,18 +53,52 @@ def runs_of_one_way(runs: Sequence[Run], scene: str, *methods: str) -> dict[str,
     return by_way[min(shared, key=lambda way: (-_pairs(by_way[way]), len(way), way))]
 
 
+def runs_of_one_budget(
+    runs: Sequence[Run], compared: Sequence[tuple[str, tuple[str, ...]]]
+) -> list[Run]:
+    """Those of one budget: what is said of several scenes and methods is of as much training.
+
+    compared: scenes, each with methods that are compared there
+
+    Of several budgets that counts in which most of these share a seed, of several of these that
+    with most such seeds, then the first in the alphabet.
+    """
+    by_budget: dict[str, list[Run]] = {}
+    for run in sorted(runs, key=lambda run: run.label["budget"]):
+        by_budget.setdefault(run.label["budget"], []).append(run)
+
+    def shared(found: Sequence[Run]) -> tuple[int, int]:
+        seeds: dict[tuple[str, str | None], set[int]] = {}
+        for run in found:
+            seeds.setdefault((run.scene, run.label.get("method")), set()).add(run.seed)
+        counts = [
+            len(set.intersection(*(seeds.get((scene, method), set()) for method in methods)))
+            for scene, methods in compared
+        ]
+        return sum(map(bool, counts)), sum(counts)
+
+    return max(by_budget.values(), key=shared, default=[])
+
+
 def _pairs(by_method: Mapping[str, Mapping[int, Run]]) -> int:
     """Seeds that all methods have."""
     return len(set.intersection(*(set(by_seed) for by_seed in by_method.values())))
 
 
 def ways_left_out(runs: Sequence[Run]) -> list[str]:
-    """A line for every scene and method that was run in several ways, of which claims use one."""
+    """A line for every scene and method that was run in several ways, of which claims use one,
+    and one where there are several budgets.
+    """
     ways: dict[tuple[str, str], set[tuple[str, ...]]] = {}
     for run in runs:
         if method := run.label.get("method"):
             ways.setdefault((run.scene, method), set()).add(_way(run))
-    return [
+    budgets = sorted({str(run.label["budget"]) for run in runs if run.label.get("method")})
+    several = (
+        f"runs of the budgets {', '.join(budgets)}: each claim is judged by those of one budget "
+        "alone, that in which most of its scenes have all of its methods"
+    )
+    return [several] * (len(budgets) > 1) + [
         f"{scene}: {method} was run in {len(found)} ways "
         f"({'; '.join(' '.join(way) for way in sorted(found, key=lambda w: (len(w), w)))}); claims "
         "are judged by runs of one way alone, that in which the methods share most seeds"

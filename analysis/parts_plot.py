@@ -9,6 +9,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -93,8 +94,9 @@ def _panel(
     axes: Axes, runs: Mapping[str, Sequence[Run]], styles: Mapping[str, dict[str, Any]]
 ) -> None:
     values = []
+    with_errors = iter(_with_one_error([run for seeds in runs.values() for run in seeds]))
     for part, seeds in runs.items():
-        curve = error_curve(_with_one_error(seeds), "error")
+        curve = error_curve([*islice(with_errors, len(seeds))], "error")
         if curve is None:
             continue
         values.append(curve.mean)
@@ -104,7 +106,7 @@ def _panel(
 
 
 def _with_one_error(runs: Sequence[Run]) -> list[Run]:
-    """The runs with the geometric mean of their metrics on hard frames as their history."""
+    """The runs with the geometric mean of the metrics that all have, on hard frames, as history."""
     histories = [
         pd.DataFrame({"run_seconds": series[:, 0], "error": np.exp(series[:, 1])})
         for series in log_error_series(runs)

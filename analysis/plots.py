@@ -179,7 +179,12 @@ def _draw(axes: Axes, panel: ErrorPanel, styles: Mapping[str, dict[str, Any]]) -
             floor, color="#666666", linestyle=(0, (4, 3)), linewidth=1, label="reference noise"
         )
         values = np.append(values, floor)
-    make_logarithmic(axes, "y", values)
+    means = np.concatenate([curve.mean for curve in curves])
+    if (means <= 0).any():  # as relMSE's may be by chance; a logarithmic axis would leave them out
+        largest = float(np.abs(means).max())
+        axes.set_yscale("symlog", linthresh=means[means > 0].min(initial=largest) or 1.0)
+    else:
+        make_logarithmic(axes, "y", values)
     if panel.log_time:
         make_logarithmic(axes, "x", np.concatenate([curve.seconds for curve in curves]))
 

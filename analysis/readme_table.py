@@ -51,7 +51,7 @@ def judged_claims(*results: str) -> dict[str, dict[str, str]]:
 
 
 def readme_table(*results: str, with_ours: bool = False) -> str:
-    """A row per claim that has runs: the first line of its evidence, and the verdict on all.
+    """A row per claim that has runs: its primary test, where that was run, and the verdict on all.
 
     with_ours: of the claims judged with our learner, not of those judged with the paper's. Without
     such runs the text is empty.
@@ -61,7 +61,9 @@ def readme_table(*results: str, with_ours: bool = False) -> str:
         if claim.with_ours == with_ours and claim.id in judged:
             line = judged[claim.id]
             shown = shown_verdict(line)
-            rows.append(markdown_row((claim.title, line["compared"], line["difference"], shown)))
+            primary = line["test"] == "primary"
+            test = (line["compared"], line["difference"]) if primary else ("not run", "")
+            rows.append(markdown_row((claim.title, *test, shown)))
     heading = [
         "| claim of the paper | primary test | difference (95 %) | verdict |",
         "|:--|:--|--:|:--|",

@@ -125,6 +125,8 @@ def _read(folder: Path) -> Run:
         history = read_table(folder / "metrics.csv")
         if (folder / "steps.csv").exists():
             read_table(folder / "steps.csv")
+        elif (folder / "chains.bin").exists():
+            raise ValueError("there is chains.bin, and no steps.csv beside it")
         for name in ("chains.bin", "target_map.bin"):
             read_records(folder / name)
     except ValueError as error:

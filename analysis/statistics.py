@@ -46,7 +46,8 @@ def paired_difference(baseline: Mapping[Any, float], other: Mapping[Any, float])
     """Relative difference (other - baseline) / baseline over the seeds both have.
 
     Maps a seed, or scene and seed, to its value. Pairing takes out what the seed alone does to
-    both. None where no seed is shared, a mean of NaN where a baseline is 0.
+    both. None where no seed is shared, a mean of NaN where a baseline is not above
+    0.
     """
     differences = _relative_differences(baseline, other)
     return estimate([*differences.values()]) if differences else None
@@ -81,9 +82,9 @@ def mean_of_shared(metrics: pd.DataFrame) -> pd.Series:
 def _relative_differences(
     baseline: Mapping[Any, float], other: Mapping[Any, float]
 ) -> dict[Any, float]:
-    """Of what both have, in order."""
+    """Of what both have, in order. NaN to a baseline of 0, or below it, as relMSE's by chance."""
     return {
-        key: (other[key] - baseline[key]) / baseline[key] if baseline[key] else math.nan
+        key: (other[key] - baseline[key]) / baseline[key] if baseline[key] > 0 else math.nan
         for key in sorted(baseline.keys() & other.keys())
     }
 

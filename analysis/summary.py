@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.methods import is_baseline, methods_in_order
+from analysis.methods import baselines, methods_in_order
 from analysis.runs import DISTINCTIONS, METRICS, SETS, Run
 from analysis.statistics import Estimate, estimate, paired_difference
 
@@ -101,12 +101,18 @@ class Comparison:
 
 
 def compare(summaries: Sequence[Summary]) -> list[Comparison]:
-    """Every method of a scene against its baseline: the first uniform sampling, else the first."""
+    """Every method of a scene against its baseline: the first uniform sampling, else the first.
+
+    Where that was run with several budgets, each method has the one of its own.
+    """
     comparisons = []
     for scene in dict.fromkeys(summary.scene for summary in summaries):
         methods = [summary for summary in summaries if summary.scene == scene and summary.is_method]
-        baseline, *others = sorted(methods, key=lambda summary: not is_baseline(summary.method))
-        compared = (_compare(baseline, other) for other in others)
+        budgets = {summary.method: summary.runs[0].label.get("budget") for summary in methods}
+        named = {summary.method: summary for summary in methods}
+        compared = (
+            _compare(named[baseline], named[other]) for other, baseline in baselines(budgets)
+        )
         comparisons += [found for found in compared if any(found.differences.values())]
     return comparisons
 
@@ -123,8 +129,10 @@ def _compare(baseline: Summary, other: Summary) -> Comparison:
 
 
 def _by_seed(runs: Sequence[Run], set_name: str, metric: str) -> dict[int, float]:
+    """Nothing where a run lacks it: with and without LPIPS weights n is not the same."""
     values = {run.seed: run.metric(set_name, metric) for run in runs}
-    return {seed: value for seed, value in values.items() if value is not None}
+    known = {seed: value for seed, value in values.items() if value is not None}
+    return known if len(known) == len(values) else {}
 
 
 def to_frame(summaries: Sequence[Summary]) -> pd.DataFrame:

@@ -9,6 +9,7 @@ from analysis.claims import CLAIMS, Claim, Comparison
 from analysis.effects import compare_on_scene, pool
 from analysis.evidence import ComparisonResult, Finding, Verdict, of_tests
 from analysis.findings import FINDINGS
+from analysis.pairs import runs_of_one_budget
 from analysis.runs import Run
 from analysis.sentences import in_words
 
@@ -43,6 +44,9 @@ def judge(runs: Sequence[Run]) -> list[ClaimResult]:
 
 
 def _judge(claim: Claim, runs: Sequence[Run]) -> ClaimResult:
+    if claim.comparisons:
+        compared = [(s, (c.better, c.worse)) for c in claim.comparisons for s in c.scenes]
+        runs = runs_of_one_budget(runs, compared)
     by_comparison = [_compare(comparison, runs) for comparison in claim.comparisons]
     comparisons = tuple(result for results in by_comparison for result in results)
     findings = tuple(FINDINGS[claim.id](runs)) if claim.id in FINDINGS else ()

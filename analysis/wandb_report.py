@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -36,7 +37,8 @@ def send(files: Sequence[Path], *, name: str, project: str) -> Path:
         settings=wandb.Settings(quiet=True),
     ) as run:
         run.log({"results": wandb.Table(dataframe=pd.read_csv(results))})
-        artifact = wandb.Artifact(f"report-{name}", type="report")
+        allowed = re.sub(r"[^\w.-]+", "-", name, flags=re.ASCII)
+        artifact = wandb.Artifact(f"report-{allowed}", type="report")
         for file in kept:
             artifact.add_file(str(file))
         run.log_artifact(artifact)

@@ -26,7 +26,8 @@ if not methods:
 
 # %% Two runs
 def differences(run: Run, baseline: Run) -> tuple[float, float, float] | None:
-    """Part of the baseline's steps, and log error less the baseline's at its end and its step.
+    """Part of the baseline's steps, and log error less the baseline's at both ends and after as
+    many steps, which are those of the shorter run.
 
     None for what is not trained, and for a run that was not evaluated.
     """
@@ -35,7 +36,9 @@ def differences(run: Run, baseline: Run) -> tuple[float, float, float] | None:
     if not (len(own) and len(its)):
         return None
     (step, error), (its_step, its_error) = own[-1], its[-1]
-    return step / its_step, error - its_error, error - np.interp(step, *its.T)
+    both = min(step, its_step)
+    after_as_many = np.interp(both, *own.T) - np.interp(both, *its.T)
+    return step / its_step, error - its_error, after_as_many
 
 
 # %% Differences in per cent, with 95 % intervals over the seeds that all scenes have, and scenes

@@ -17,7 +17,9 @@ def test_each_learner_has_a_figure_of_its_own(make_method, tmp_path) -> None:
     make_method("ours_exploring", scene="salon-5")
     files = write_dimensions_figures(find_runs(tmp_path)[0], tmp_path)
     assert [file.name for file in files] == ["ours_dimensions.png", "ours_dimensions.svg"]
-    assert "error of ours_uniform minus error of ours_exploring" in files[1].read_text()
+    assert (
+        "error of ours with uniform sampling minus error of ours exploring" in files[1].read_text()
+    )
     make_method("uniform", scene="salon-5")
     files = write_dimensions_figures(find_runs(tmp_path)[0], tmp_path)
     assert {file.stem for file in files} == {"dimensions", "ours_dimensions"}

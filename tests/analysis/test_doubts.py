@@ -1,5 +1,9 @@
 """What is said of runs that can be compared, but whose comparison is doubtful."""
 
+import shutil
+
+import pytest
+
 from analysis.doubts import comparison_warnings
 from analysis.runs import find_runs
 from tests.analysis.changes import set_value
@@ -11,6 +15,24 @@ def test_two_clocks_in_one_comparison_are_a_doubt(make_run, tmp_path) -> None:
     model = make_run(seed=1, change=set_value("clock", value="model"))
     (warning,) = comparison_warnings(find_runs(tmp_path)[0])
     assert f"different clocks: wall in {wall}; model in {model}" in warning
+
+
+@pytest.mark.parametrize(
+    ("part", "value"), [("cores", 16), ("gpu", "NVIDIA H200"), ("processor", "another")]
+)
+def test_two_machines_in_one_comparison_are_a_doubt(make_run, tmp_path, part, value) -> None:
+    machine = {"processor": "abacus", "backend": "llvm", "cores": 2, "gpu": None}
+    make_run(seed=0, change=set_value("machine", value=machine))
+    make_run(seed=1, change=set_value("machine", value={**machine}))
+    assert comparison_warnings(find_runs(tmp_path)[0]) == []
+    before = {key: machine[key] for key in ("processor", "backend")}
+    older = make_run(seed=3, change=set_value("machine", value=before))  # and nobody knows
+    assert comparison_warnings(find_runs(tmp_path)[0]) == []
+    shutil.rmtree(older)
+    other = make_run(seed=2, change=set_value("machine", value={**machine, part: value}))
+    (warning,) = comparison_warnings(find_runs(tmp_path)[0])
+    assert str(value) in warning
+    assert str(other) in warning
 
 
 def test_several_commits_and_changed_files_are_doubts(make_run, tmp_path) -> None:

@@ -67,6 +67,22 @@ def test_the_table_has_a_row_per_scene_and_method_with_a_trace(runs: list[Run]) 
     assert texts[1][table.columns.index("small steps")] == "–"
 
 
+def test_what_one_run_does_not_tell_is_not_the_others_mean(runs: list[Run]) -> None:
+    """A median lifetime that was not reached is a long one, and not to be left out."""
+    folder = next(run.folder for run in runs if run.method == "mcmc_loss_step")
+    accepted = np.zeros((COUNT, CHAINS), bool)
+    accepted[0] = True
+    (folder / "chains.bin").unlink()
+    write_trace(folder, np.random.default_rng(1).random((COUNT, CHAINS, 4)), accepted)
+    numbers = [exploration_numbers(run) for run in runs if run.method == "mcmc_loss_step"]
+    lifetimes = [found["median_lifetime"] for found in numbers if found is not None]
+    assert np.isnan(lifetimes).tolist() == [True, False]
+    table = exploration_table(runs)
+    row = [cell.text for cell in table.rows[1]]
+    assert row[:3] == ["mirror", "mcmc_loss_step", "2"]
+    assert row[table.columns.index(COLUMNS["median_lifetime"])] == "–"
+
+
 def test_figures_of_scenes_with_a_trace_are_written(runs: list[Run], tmp_path: Path) -> None:
     written = write_exploration_figures(runs, method_styles(runs), tmp_path)
     names = (

@@ -108,6 +108,13 @@ def test_the_lowest_error_of_each_metric_is_bold_and_ties_are() -> None:
     assert table.splitlines()[2:] == ["| box | 2 | **0.100** / **0.200** | 0.300 / **0.200** |"]
 
 
+def test_methods_with_fewer_seeds_are_not_said_to_have_as_many() -> None:
+    found = results(ours=(0.1, 0.2), active_exploration=(0.3, 0.2))
+    found.loc[found["method"] == "active_exploration", "seeds"] = 0
+    table = learner_table(found, ("mape",), ("ours", "active_exploration"))
+    assert table.splitlines()[2] == "| box | 2, 1 | **0.100** | 0.300 |"
+
+
 def test_a_page_without_its_place_is_refused() -> None:
     begin, end = "<!-- rays: written by analysis.learner_table -->", "<!-- end of rays -->"
     page = with_tables(f"a\n{begin}\nold\n{end}\nb", {"rays": "new"})

@@ -149,7 +149,9 @@ def test_importing_the_library_loads_nothing_heavy() -> None:
 
 
 def test_the_steps_that_a_method_had_no_time_for(make_method, tmp_path) -> None:
-    """One method is the baseline with every step a quarter slower, the other 10 % worse."""
+    """One method is the baseline with every step a quarter slower, one with twice the steps, and
+    one 10 % worse.
+    """
 
     def of(steps):
         return lambda result: result.update(steps=steps)
@@ -163,6 +165,10 @@ def test_the_steps_that_a_method_had_no_time_for(make_method, tmp_path) -> None:
         worse = make_method("metropolis", seed=seed, error=0.11, change=of(800)) / "metrics.csv"
         rows = pd.read_csv(worse)
         rows.assign(hard_relmse=-1e-5, hard_tail=7.0).to_csv(worse, index=False)
+        faster = make_method("no_preconditioning", seed=seed, rate=0.02, change=of(1600))
+        rows = pd.read_csv(faster / "metrics.csv")
+        steps = [*2 * rows["step"][:-1], 1600]
+        rows.assign(step=steps).to_csv(faster / "metrics.csv", index=False)
     answer = subprocess.run(
         [sys.executable, "-W", "error", "-m", "analysis.examples.same_steps", tmp_path / "runs"],
         capture_output=True,
@@ -170,10 +176,13 @@ def test_the_steps_that_a_method_had_no_time_for(make_method, tmp_path) -> None:
         cwd=REPOSITORY,
     )
     assert answer.returncode == 0, answer.stderr
-    _, slower, time, steps, worse, *both = answer.stdout.splitlines()
+    _, slower, time, steps, worse, *lines = answer.stdout.splitlines()
+    *both, faster, _, as_many = lines
     assert slower == "active_exploration: 2 runs, 0.750 of the steps"
     expected = (1 + 7 * math.exp(-1.8)) / (1 + 7 * math.exp(-2.4))
     assert float(time.split()[4]) == pytest.approx(100 * (expected - 1), abs=0.1)
     assert steps.split()[4] == "+0.0"
     assert worse == "metropolis: 2 runs, 1.000 of the steps"
     assert [line.split()[4] for line in both] == ["+10.0", "+10.0"]
+    assert faster == "no_preconditioning: 2 runs, 2.000 of the steps"
+    assert as_many.split()[4] == "+0.0"

@@ -6,6 +6,7 @@ from io import BytesIO
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.figure import Figure
 from PIL import Image
 from scipy import stats
 
@@ -106,6 +107,20 @@ def test_the_picture_has_a_panel_per_ablation_and_scene(folder, tmp_path, monkey
     for row in (slice(0, height // 2), slice(height // 2, height)):
         for column in (slice(0, int(0.35 * width)), slice(int(0.35 * width), int(0.7 * width))):
             assert coloured[row, column].any()
+
+
+def test_curves_of_parts_are_of_the_metrics_that_all_runs_have(make_method, tmp_path) -> None:
+    """Else a part that was run without LPIPS' weights would look better than it is."""
+    methods = ("ours", "ours_without/big_steps")
+    files = [make_method(method, scene="box") / "metrics.csv" for method in methods]
+    table = pd.read_csv(files[0]).assign(hard_lpips=0.5)
+    table.to_csv(files[0], index=False)
+    table.assign(hard_lpips=np.nan).to_csv(files[1], index=False)
+    runs = {run.label["method"]: [run] for run in find_runs(tmp_path)[0]}
+    axes = Figure().subplots()
+    parts_plot._panel(axes, {"": runs[methods[0]], "big_steps": runs[methods[1]]}, {})
+    whole, part = axes.lines
+    np.testing.assert_array_equal(whole.get_ydata(), part.get_ydata())
 
 
 def test_other_runs_are_left_out_and_two_of_one_kind_refused(folder, make_method) -> None:

@@ -97,14 +97,18 @@ def test_claims_judged_with_ours_have_a_table_of_their_own(make_method, tmp_path
 
 
 def test_a_claim_that_two_reports_have_runs_of_is_the_first_ones() -> None:
-    heading = "**Claims of the paper**\n\n|claim|compared|difference|of the claim|\n|-|-|-|-|\n"
+    columns = ("claim", "test", "compared", "difference", "of the claim")
+    heading = f"**Claims of the paper**\n\n|{'|'.join(columns)}|\n|-|-|-|-|-|\n"
 
-    def report(name: str, *claims: str) -> str:
-        return heading + "\n".join(f"|{claim}|{name}|1|inconclusive|" for claim in claims) + "\n\n"
+    def report(name: str, *claims: str, test: str = "primary") -> str:
+        rows = [f"|{claim}|{test}|{name}|1|inconclusive|" for claim in claims]
+        return heading + "\n".join(rows) + "\n\n"
 
     one, other = report("one", "chess"), report("other", "resolution", "chess")
     rows = readme_table(one, other).splitlines()[2:]
     assert [row.split(" | ")[1] for row in rows] == ["other", "one"]
+    (row,) = readme_table(report("beside", "chess", test="further")).splitlines()[2:]
+    assert row.split(" | ")[1:3] == ["not run", ""]
 
 
 def test_what_is_missing_is_said(tmp_path, capsys) -> None:

@@ -1,11 +1,13 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from analysis.methods import differing_fields, methods_in_order, name_methods, title
 from analysis.runs import check_comparable, find_runs
 from tests.analysis.changes import set_value
+from tests.analysis.traces import CHAINS, write_trace
 
 
 def methods(folder: Path) -> list[str]:
@@ -139,6 +141,8 @@ def damage(folder: Path, kind: str) -> None:
         (folder / "metrics.csv").unlink()
     elif kind == "empty history":
         (folder / "metrics.csv").write_text("")
+    elif kind == "trace alone":
+        write_trace(folder, np.zeros((2, CHAINS, 4)), np.ones((2, CHAINS), bool))
     elif kind == "foreign history":
         (folder / "metrics.csv").write_text("a,b\n1,2\n")
 
@@ -155,6 +159,7 @@ def damage(folder: Path, kind: str) -> None:
         ("no history", "metrics.csv cannot be read"),
         ("empty history", "metrics.csv cannot be read"),
         ("foreign history", "metrics.csv cannot be read"),
+        ("trace alone", "there is chains.bin, and no steps.csv beside it"),
     ],
 )
 def test_damaged_and_unfinished_runs_are_named(make_run, tmp_path, kind: str, reason: str) -> None:

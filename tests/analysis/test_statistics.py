@@ -51,6 +51,13 @@ def test_relative_difference_to_zero_is_undefined() -> None:
     assert result.half_width is None
 
 
+def test_relative_difference_to_less_than_zero_is_no_gain() -> None:
+    """Noise-free relMSE is below 0 by chance."""
+    result = paired_difference({0: -0.0002}, {0: 0.0001})
+    assert result is not None
+    assert math.isnan(result.mean)
+
+
 def test_pairs_are_made_by_seed() -> None:
     baseline = {0: 1.0, 1: 10.0, 2: 100.0, 7: 5.0}
     other = {2: 90.0, 1: 9.0, 0: 0.9, 8: 5.0}

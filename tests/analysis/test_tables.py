@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from analysis.latex import escape, to_latex
-from analysis.methods import name_methods
+from analysis.methods import baselines, name_methods, title
 from analysis.runs import METRICS, SETS, find_runs
 from analysis.statistics import Estimate, estimate
 from analysis.summary import Comparison, compare, summarise, to_frame
@@ -21,6 +21,7 @@ from analysis.tables import (
     to_terminal,
     worst_table,
 )
+from analysis.time_table import time_table
 
 
 def test_a_row_has_a_cell_below_every_title() -> None:
@@ -81,6 +82,40 @@ def test_every_method_is_compared_with_the_baseline(make_run, tmp_path) -> None:
     make_run()
     others = ("mcmc_gradient", "mcmc_loss", "mcmc_loss_step")
     assert pairs() == [("uniform", other) for other in others]
+
+
+def test_a_method_is_compared_with_the_baseline_of_its_own_budget(make_run, tmp_path) -> None:
+    for budget in ("hour", "small"):
+        make_run(method="uniform", budget=budget)
+        make_run(method="active_exploration", budget=budget)
+    runs = name_methods(find_runs(tmp_path)[0])
+    pairs = [(found.baseline, found.other) for found in compare(summarise(runs))]
+    expected = [(f"uniform, {b}", f"active_exploration, {b}") for b in ("hour", "small")]
+    assert pairs == expected
+    rows = [[cell.text for cell in row[1:3]] for row in time_table(runs).rows]
+    assert rows == [[title(other), title(baseline)] for baseline, other in expected]
+
+
+def test_without_uniform_sampling_each_budget_has_a_first_method() -> None:
+    budgets = {"a, hour": "hour", "a, small": "small", "b, hour": "hour", "b, small": "small"}
+    assert baselines(budgets) == [("b, hour", "a, hour"), ("b, small", "a, small")]
+
+
+def test_without_a_baseline_of_its_own_budget_any_is_better_than_none(make_run, tmp_path) -> None:
+    make_run(method="uniform", budget="hour")
+    make_run(method="active_exploration", budget="small")
+    (comparison,) = compare(summarise(name_methods(find_runs(tmp_path)[0])))
+    assert (comparison.baseline, comparison.other) == ("uniform", "active_exploration")
+
+
+def test_a_metric_that_one_seed_lacks_is_not_compared(make_run, tmp_path) -> None:
+    for seed in range(3):
+        make_run(seed=seed)
+        make_run(sampler="mcmc_loss", seed=seed, lpips=seed == 0)
+    (comparison,) = compare(summarise(name_methods(find_runs(tmp_path)[0])))
+    assert comparison.differences["hard_lpips"] is None
+    assert comparison.differences["hard_mape"] is not None
+    assert comparison.differences["hard_mape"].n == 3
 
 
 def test_undefined_difference_is_shown_as_missing() -> None:

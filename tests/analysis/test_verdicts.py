@@ -9,6 +9,7 @@ from analysis.claims import CLAIMS, SALONS
 from analysis.evidence import ALL_SCENES, Verdict
 from analysis.findings import FINDINGS
 from analysis.methods import TITLES, name_methods
+from analysis.pairs import ways_left_out
 from analysis.plots import COLOURS, DASHES
 from analysis.runs import find_runs
 from analysis.verdicts import ClaimResult, judge
@@ -137,6 +138,45 @@ def test_a_missing_scene_leaves_the_claim_open(make_method, tmp_path) -> None:
     assert result.comparisons[-1].verdict is Verdict.REPRODUCED
     assert result.verdict is Verdict.INCONCLUSIVE
     assert "5 of 7 scenes are not run yet" in result.sentence
+
+
+def test_scenes_of_two_budgets_are_not_pooled(make_method, tmp_path) -> None:
+    for scene, budget in {"sphere-caustic": "small", "living-room": "hour"}.items():
+        for seed in range(3):
+            make_method("active_exploration", scene=scene, seed=seed, error=0.05, budget=budget)
+            make_method("metropolis", scene=scene, seed=seed, budget=budget)
+    result = judged(tmp_path)["acceptance"]
+    assert [comparison.scene for comparison in result.comparisons] == ["living-room"]
+    assert result.verdict is Verdict.INCONCLUSIVE
+    assert "1 of 2 scenes are not run yet" in result.sentence
+
+
+def test_that_budget_counts_which_most_scenes_share(make_method, tmp_path) -> None:
+    for seed in range(3):
+        for scene in ("sphere-caustic", "living-room"):
+            make_method("active_exploration", scene=scene, seed=seed, error=0.05, budget="small")
+            make_method("metropolis", scene=scene, seed=seed, budget="small")
+        make_method("active_exploration", seed=seed, error=0.2, budget="hour")
+        make_method("metropolis", seed=seed, budget="hour")
+    result = judged(tmp_path)["acceptance"]
+    assert result.verdict is Verdict.REPRODUCED
+    assert result.comparisons[1].decisive.effect_percent == pytest.approx(-50, abs=5)
+    lines = ways_left_out(find_runs(tmp_path)[0])
+    assert lines[0].startswith("runs of the budgets hour, small: each claim is judged by those")
+
+
+def test_of_two_budgets_with_as_many_scenes_that_with_more_seeds_counts(
+    make_method, tmp_path
+) -> None:
+    for budget, seeds, error in (("machine", 1, 0.2), ("small", 3, 0.05)):
+        for seed in range(seeds):
+            for scene in ("sphere-caustic", "living-room"):
+                named = {"scene": scene, "seed": seed, "budget": budget}
+                make_method("active_exploration", error=error, **named)
+                make_method("metropolis", **named)
+    result = judged(tmp_path)["acceptance"]
+    assert result.verdict is Verdict.REPRODUCED
+    assert result.comparisons[-1].decisive.seeds == 3
 
 
 def resolution(make_method, growing: float) -> None:  # type: ignore[no-untyped-def]

@@ -17,7 +17,7 @@ def runs(make_run, tmp_path, monkeypatch) -> Path:
     monkeypatch.setattr(
         "analysis.report_files.write_page", lambda _contents, file, _progress: file.touch()
     )
-    return tmp_path / "runs"
+    return (tmp_path / "runs").rename(tmp_path / "seed=0,1")
 
 
 @pytest.mark.usefixtures("undrawn")
@@ -27,8 +27,9 @@ def test_tables_are_an_artifact_beside_the_runs(runs: Path, capsys) -> None:
     assert str(file.parent) in capsys.readouterr().out
     found = records(file)
     run = next(of_kind(found, "run"))
-    assert (run["project"], run["run_group"], run["job_type"]) == ("caustics", "runs", "report")
+    assert (run["project"], run["run_group"], run["job_type"]) == ("caustics", "seed=0,1", "report")
     (artifact,) = [a for a in of_kind(found, "artifact") if a["type"] == "report"]
+    assert artifact["name"] == "report-seed-0-1", "W&B takes no other signs"
     kept = {entry["path"]: int(entry.get("size", 0)) for entry in artifact["manifest"]["contents"]}
     names = {"results.csv", "results.md", "results.tex", "provenance.csv", "index.html"}
     assert kept == {name: (runs / "report" / name).stat().st_size for name in names}
