@@ -12,6 +12,7 @@ from torch import Tensor
 from ngi.explore import Describe
 from ngi.learn.glimpses import sparse
 from ngi.learn.samples import Samples
+from ngi.models.loss import log_of_radiance
 from ngi.patches import Patches
 
 DARK = 0.1
@@ -58,7 +59,8 @@ def distances(one: Tensor, other: Tensor) -> Tensor:
 
     one, other: images [n, h, w, 3] of log1p radiance, at least 0 or counted as 0
     """
-    return (_logarithms(one) - _logarithms(other)).abs().mean(dim=(1, 2, 3))
+    one, other = (log_of_radiance(image.float(), offset=DARK) for image in (one, other))
+    return (one - other).abs().mean(dim=(1, 2, 3))
 
 
 def features(buffers: Tensor, vectors: Tensor, present: Tensor, averaged: Tensor) -> Tensor:
@@ -69,7 +71,8 @@ def features(buffers: Tensor, vectors: Tensor, present: Tensor, averaged: Tensor
 
     buffers: [n, h, w, C]; vectors: [n, D]; present, averaged: answers [n, h, w, 3], log1p radiance
     """
-    pixels = torch.cat([buffers.float(), _logarithms(averaged).to(buffers.device)], dim=-1)
+    logarithms = log_of_radiance(averaged.float(), offset=DARK).to(buffers.device)
+    pixels = torch.cat([buffers.float(), logarithms], dim=-1)
     disagreement = distances(present, averaged)
     return torch.cat(
         [
@@ -88,9 +91,3 @@ def disagreeing_relatively(known: Tensor) -> Tensor:
     mean = disagreement.mean()
     relative = disagreement / mean if mean > 0 else torch.ones_like(disagreement)
     return torch.cat([known[:, :-1], relative], dim=1)
-
-
-def _logarithms(log_radiance: Tensor) -> Tensor:
-    """log(radiance + `DARK`), finite for every finite log1p radiance."""
-    positive = log_radiance.float().clamp(min=0)
-    return positive + (-(1 - DARK) * (-positive).exp()).log1p()

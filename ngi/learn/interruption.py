@@ -80,10 +80,10 @@ class Interruption:
         return checking
 
     def _receive(self, number: int, _frame: FrameType | None) -> None:
+        if number == signal.SIGINT:
+            signal.signal(signal.SIGINT, self._before[signal.SIGINT])
         if self._received is not None:
             return
         self._received = signal.Signals(number)
-        if signal.SIGINT in self._before:
-            signal.signal(signal.SIGINT, self._before[signal.SIGINT])
         if not self._deferred:
             self.check()

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from queue import Full, Queue
 from threading import Event, Thread
+from time import monotonic
 from typing import Any
 
 from ngi.evaluate import SETS, Comparison, Evaluation
@@ -49,14 +50,16 @@ class Aside:
                 self._warn(f"takes no more calls, {CAPACITY} of them wait")
             self.dropped += 1
 
-    def end(self, *, seconds: float) -> None:
-        """Waits for the calls under way, for so long at most; says what was lost."""
+    def end(self, *last: Callable[[], None], seconds: float) -> None:
+        """Makes the last calls and waits for all, for so long at most; says what was lost."""
+        deadline = monotonic() + seconds
         try:
-            self._calls.put(None, timeout=seconds)
+            for call in (*last, None):
+                self._calls.put(call, timeout=max(0.0, deadline - monotonic()))
         except Full:
             pass  # nothing moves any more
         else:
-            self._ended.wait(seconds)
+            self._ended.wait(max(0.0, deadline - monotonic()))
         if not self._ended.is_set():
             self._warn(f"has not ended after {seconds:g} s and is left behind")
         if self.dropped:
@@ -134,10 +137,9 @@ class Remote(Tracker):
     def finish(self, *, failed: bool) -> None:
         if self._aside is None:
             return
-        if not failed:
-            self._call(self._keep)
-        self._call(lambda: self._end(failed=failed))
-        self._aside.end(seconds=FINISH_SECONDS + LEEWAY_SECONDS)
+        last = [] if failed else [self._keep]
+        last.append(lambda: self._end(failed=failed))
+        self._aside.end(*last, seconds=FINISH_SECONDS + LEEWAY_SECONDS)
         self._aside = None
 
     def _call(self, function: Callable[[], None]) -> None:

@@ -55,6 +55,7 @@ class WeightsAndBiases(Remote):
         self._network = network
         self._options = options
         self._run: Any = None
+        self._first = 0
 
     def finished(self, *, folder: Path, settings: dict[str, Any], label: dict[str, Any]) -> None:
         """Of a sweep by W&B's agents, the last evaluation is told once more: it waits for one."""
@@ -90,6 +91,7 @@ class WeightsAndBiases(Remote):
             reinit="finish_previous",
             settings=wandb.Settings(quiet=True, finish_timeout=FINISH_SECONDS),
         )
+        self._first = int(self._run.step)
         self._run.define_metric("step")
         self._run.define_metric("run_seconds", step_metric="step")
         for section in ("train", "run"):
@@ -98,14 +100,23 @@ class WeightsAndBiases(Remote):
             self._run.define_metric(f"{section}/*", step_metric="run_seconds")
 
     def _log(self, row: dict[str, float]) -> None:
-        self._run.log(row, step=int(row["step"]))
+        self._send(row, int(row["step"]))
+
+    def _send(self, content: dict[str, Any], step: int) -> None:
+        """W&B ignores steps before that with which a run goes on there. What is made once more of
+        the step before, as an evaluation, is sent with what comes next; of earlier ones it has all.
+        """
+        if step >= self._first:
+            self._run.log(content, step=step)
+        elif step == self._first - 1:
+            self._run.log(content, commit=False)
 
     def _show(self, comparison: Comparison, step: int) -> None:
         from wandb import Image
 
         maps = [Image(image, caption=name) for name, image in comparison.error_maps.items()]
         sheet = Image(comparison.sheet, file_type="jpg")
-        self._run.log({"comparison": sheet, "error_maps": maps}, step=step)
+        self._send({"comparison": sheet, "error_maps": maps}, step)
 
     def _keep(self) -> None:
         self._add("result", "result", RESULT)

@@ -220,7 +220,7 @@ class Picker(Input):
     @property
     def _white(self) -> float:
         """What the brightest colour of a screen stands for."""
-        return max(1.0, *(control.high for control in self._channels))
+        return max(1.0, *(end for one in self._channels for end in (one.low, one.high)))
 
 
 def inputs(controls: Sequence[Control]) -> Iterator[Input]:

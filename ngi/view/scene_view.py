@@ -7,6 +7,7 @@ from time import perf_counter
 import torch
 from torch import Tensor
 
+from ngi.evaluate.metrics import radiance_of
 from ngi.render import Renderer
 
 Predict = Callable[..., Tensor]
@@ -69,7 +70,7 @@ class SceneView:
             buffers, preview = self.buffers, self.place.rays is not None
             self._prediction = self._timed(
                 "network",
-                lambda: self.predict(buffers, self.place.tensor(), preview=preview).expm1(),
+                lambda: radiance_of(self.predict(buffers, self.place.tensor(), preview=preview)),
             )
         return self._prediction
 

@@ -11,6 +11,7 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
+from ngi.evaluate.metrics import radiance_of
 from ngi.files.durable import DamagedError
 from ngi.files.run_folder import LAST, PREVIOUS
 from ngi.learn import Samples, network_of, read_checkpoint
@@ -91,7 +92,7 @@ class TrainedRun(OpenedRun):
     def radiance(self, scene_vector: Tensor, *, resolution: int) -> Tensor:
         """[H, W, 3]: what the network says of a v of shape [D]; linear RGB, possibly negative."""
         buffers = self.renderer.image_buffers(scene_vector, resolution=resolution)
-        return torch.expm1(self.predict(buffers, scene_vector))
+        return radiance_of(self.predict(buffers, scene_vector))
 
 
 def _image(network: nn.Module, samples: Samples, *, recorded: bool) -> Function:

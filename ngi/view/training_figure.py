@@ -19,6 +19,8 @@ from ngi.view.screen import Pixels
 COLOURS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7")
 WIDTH, HEIGHT, DOTS_PER_INCH = 4.2, 12.0, 100
 PATCH_COLUMNS = 4
+ABOVE_LEGEND = 20.0
+"""Points from curves to their title."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,8 @@ def training_figure(
 
 
 def _errors(axes: Axes, evaluations: pd.DataFrame) -> None:
-    axes.set(title="error on hard frames", xlabel="run time in seconds")
+    axes.set(xlabel="run time in seconds")
+    axes.set_title("error on hard frames", pad=ABOVE_LEGEND)
     shown = False
     for metric, colour in zip(METRICS, COLOURS, strict=True):
         key = f"hard_{metric}"
@@ -80,11 +83,12 @@ def _errors(axes: Axes, evaluations: pd.DataFrame) -> None:
             shown = True
     if shown:
         axes.set_yscale("log")
-        axes.legend(frameon=False, fontsize=8)
+        _legend(axes)
 
 
 def _losses(axes: Axes, steps: pd.DataFrame) -> None:
-    axes.set(title="loss and reuse", xlabel="run time in seconds")
+    axes.set(xlabel="run time in seconds")
+    axes.set_title("loss and reuse", pad=ABOVE_LEGEND)
     every = max(1, len(steps) // 500)
     for key, colour, label in (
         ("loss_new", COLOURS[0], "new samples"),
@@ -96,7 +100,20 @@ def _losses(axes: Axes, steps: pd.DataFrame) -> None:
             axes.plot(*rows.to_numpy().T, color=colour, label=label, lw=1.2)
     axes.set_ylim(bottom=0)  # keeps the top as it is by then
     if axes.lines:
-        axes.legend(frameon=False, fontsize=8)
+        _legend(axes)
+
+
+def _legend(axes: Axes) -> None:
+    """Between title and curves, on which it would lie elsewhere."""
+    axes.legend(
+        loc="lower center",
+        bbox_to_anchor=(0.5, 1.0),
+        ncols=len(METRICS),
+        frameon=False,
+        fontsize=8,
+        columnspacing=1.0,
+        borderaxespad=0.2,
+    )
 
 
 def _chains(axes: Axes, visited: Visited, across: Axis, up: Axis) -> None:
@@ -113,7 +130,8 @@ def _chains(axes: Axes, visited: Visited, across: Axis, up: Axis) -> None:
             plotnonfinite=True,
             s=9,
         )
-        axes.figure.colorbar(points, ax=axes, label="target density of proposals")
+        label = "target density of proposals"  # below, so that curves above are as wide
+        axes.figure.colorbar(points, ax=axes, label=label, orientation="horizontal")
     horizontal, vertical = visited.current[:, columns].T.numpy()
     axes.scatter(horizontal, vertical, s=45, facecolors="none", edgecolors="#D55E00")
 

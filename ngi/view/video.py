@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack, closing
@@ -109,6 +110,8 @@ def _check_replaced(options: VideoOptions, figures: Path) -> None:
             "choose another name"
         ) from None
     now = _decisive(asdict(options), map(Path, (options.run, *(options.beside or ()))))
+    now["key_frames"] = _content(options.path)
+    before["key_frames"] = film.get("key_frames", now["key_frames"])
     apart = [key for key in now if before[key] != now[key]]
     if measured and apart:
         was, would_be = (", ".join(f"{key}={of[key]}" for key in apart) for of in (before, now))
@@ -116,6 +119,12 @@ def _check_replaced(options: VideoOptions, figures: Path) -> None:
             f"out: {figures} holds what was measured with {was}, and would be replaced by a video "
             f"with {would_be}; give this one another name with out=…, or delete that one"
         )
+
+
+def _content(path: str) -> str:
+    """Of a file with key frames, 16 hexadecimal digits; empty for a path by its name."""
+    file = Path(path)
+    return hashlib.sha256(file.read_bytes()).hexdigest()[:16] if file.is_file() else ""
 
 
 def _folders(film: dict[str, Any], figures: Path) -> list[Path]:
@@ -197,6 +206,7 @@ def _write_json(file: Path, options: VideoOptions, film: Film, measured: Measure
     content = {
         **provenance(backend=first.renderer.description),
         "options": asdict(options),
+        "key_frames": _content(options.path),
         "scene": first.scene_name,
         "scene_hash": first.renderer.scene_hash,
         "runs": [

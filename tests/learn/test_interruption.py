@@ -200,6 +200,7 @@ def test_what_is_in_hand_is_finished_first() -> None:
     for number in (signal.SIGTERM, signal.SIGINT):
         assert signals_in_hand(number) == ["what is in hand"]
     assert signals_in_hand(signal.SIGTERM, signal.SIGTERM) == ["what is in hand"], "as by `timeout`"
+    assert signals_in_hand(signal.SIGTERM, signal.SIGINT) == ["what is in hand"]
     assert signals_in_hand() == ["what is in hand", "what comes next"]
     assert [signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGINT)] == before
 
@@ -211,6 +212,8 @@ def test_the_status_survives_the_way_from_a_process_of_a_sweep() -> None:
 def test_a_second_ctrl_c_does_not_wait() -> None:
     with pytest.raises(KeyboardInterrupt):
         signals_in_hand(signal.SIGINT, signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt):
+        signals_in_hand(signal.SIGTERM, signal.SIGINT, signal.SIGINT)
 
 
 def test_an_error_while_saving_is_not_hidden_by_the_signal() -> None:

@@ -43,13 +43,15 @@ class FakeWandb:
         self.id = "abc"
         self.Artifact = FakeArtifact
         self.log_artifact = lambda _: None
+        self.step = 0
 
     def init(self, **_):
         self._called("init")
         return self
 
-    def log(self, row, *, step) -> None:
+    def log(self, row, *, step=None, commit=True) -> None:
         self._called("log")
+        assert commit == (step is not None), "what has no step goes with the next that has"
         self.rows.append({**row, "step": step})
 
     def finish(self, *, exit_code) -> None:
@@ -143,6 +145,29 @@ def test_what_hangs_holds_nothing_up(watch, caplog, monkeypatch) -> None:
     assert 1940 <= int(lost[1]) <= 1960
     assert len(caplog.records) == 3
     assert wandb.rows == [] or len(wandb.rows) <= 52
+
+
+def test_the_last_evaluation_is_not_lost_where_it_is_made_again(watch) -> None:
+    """W&B begins a run that goes on after its last step, and ignores what is of earlier ones."""
+    gate = threading.Event()
+    wandb, watched = watch(lambda what: gate.wait(60) if what == "init" else None)
+    wandb.step = 8  # it has seen step 7
+    gate.set()
+    for step in (5, 7, 8, 9):  # of a longer run the first is of before its learning rate fell
+        watched.step({"step": step, "loss": 0.5})
+    watched.finish(failed=False)
+    assert [row["step"] for row in wandb.rows] == [None, 8, 9]
+
+
+def test_the_end_is_told_where_too_many_calls_wait(watch, caplog, monkeypatch) -> None:
+    """Of steps that are faster than the program some are lost, and not the result."""
+    monkeypatch.setattr(remote, "CAPACITY", 5)
+    wandb, watched = watch(lambda what: time.sleep(0.01) if what == "log" else None)
+    for step in range(200):
+        watched.step({"step": step})
+    watched.finish(failed=False)
+    assert wandb.calls[-1] == "finish 0"
+    assert "has lost" in caplog.text
 
 
 def test_rows_go_on_where_the_network_comes_back(watch, caplog) -> None:

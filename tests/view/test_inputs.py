@@ -1,6 +1,7 @@
 """What a user sets in the panel is what v becomes, and the other way round."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -74,6 +75,14 @@ def test_the_colour_of_a_light_is_relative_to_its_brightest() -> None:
     picker = Picker(*LAMP)
     assert picker.shown([1, 1, 1]) == (255, 255, 255)
     assert picker.components((255, 255, 0)) == {0: 1, 1: 1, 2: 0}
+
+
+def test_a_light_that_becomes_darker_along_v_is_shown_as_it_is() -> None:
+    """As scenes of the authors may have it: v = 0 stands for the brightest."""
+    falling = [replace(channel, low=channel.high, high=channel.low) for channel in LAMP]
+    picker = Picker(*falling)
+    assert picker.shown([0, 0, 0]) == (255, 255, 255)
+    assert picker.components((255, 255, 255)) == {0: 0, 1: 0, 2: 0}
 
 
 def test_what_is_set_in_the_panel_is_v(gui: viser.GuiApi) -> None:

@@ -1,5 +1,6 @@
 """Which file `ngi video` writes, and that it replaces no other video's figures."""
 
+import hashlib
 import json
 from dataclasses import asdict
 from pathlib import Path
@@ -66,6 +67,23 @@ def test_what_another_video_measured_is_not_replaced(
         "one\n"
     )
     assert figures.read_text() == content
+
+
+def test_nor_is_that_of_another_path_in_the_same_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (path := tmp_path / "tour.json").write_text("[[0, 0], [1, 1]]")
+    figures = measured_film(
+        tmp_path, "video_tour.json", measured=MEASURED, path="tour.json", reference=256
+    )
+    words = [f"run={tmp_path}", "path=tour.json", "reference=256"]
+    content = json.loads(figures.read_text())
+    for key_frames in (hashlib.sha256(path.read_bytes()).hexdigest()[:16], "0123456789abcdef"):
+        figures.write_text(json.dumps({**content, "key_frames": key_frames}))
+        assert main(words) == 2
+        said = capsys.readouterr().err
+        assert ("holds what was measured with key_frames=" in said) == (key_frames[0:3] == "012")
 
 
 @pytest.mark.parametrize(
