@@ -16,7 +16,7 @@ class Importance:
     and what exceeds R / m of it goes to the others, in proportion to what each lacks of R / m.
 
     uniform_share: α, in [0, 1]; 1 is the uniform density. As p_i >= α / m, no weight of single
-        draws exceeds 1 / α
+        draws exceeds 1 / α; those of several together scatter with how long the draw takes
     power: of the values, above 0
     largest_ratio: R, at least 1; no candidate is drawn more than so many times as often as by
         uniform draws. Without it a single one that holds most of the value would get most of 1 - α
@@ -40,7 +40,7 @@ class Importance:
         if self.weighted and self.uniform_share == 0:
             raise ValueError(
                 "uniform_share: 0 with weighted: true: the weights would have no bound; give a "
-                "share above 0, the largest weight is about its inverse"
+                "share above 0, weights scatter up to about its inverse"
             )
 
     def probabilities(self, values: Tensor) -> Tensor:

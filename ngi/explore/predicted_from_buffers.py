@@ -80,6 +80,11 @@ class PredictedFromBuffers(PredictedLoss):
         self._grown_from = uniform_first
         self._sequence = SobolSequence(seed=seed)
 
+    def init(self, state_dimensions: int) -> PredictedState:
+        """Raises ValueError for more dimensions than there are Sobol sequences for."""
+        self._sequence.points(0, 1, state_dimensions)
+        return super().init(state_dimensions)
+
     def _valued(
         self,
         state: PredictedState,

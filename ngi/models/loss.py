@@ -16,6 +16,12 @@ class SampleLoss(Protocol):
         ...
 
 
+def log_of_radiance(log1p_radiance: Tensor, *, offset: float) -> Tensor:
+    """log(r + offset) of log1p radiance, also where r would overflow; of negative r that of 0."""
+    above = log1p_radiance.clamp_min(0)
+    return above + ((offset - 1) * (-above).exp()).log1p()
+
+
 @dataclass(frozen=True, kw_only=True)
 class L1Dssim:
     """l1_weight · mean |prediction − target| + dssim_weight · (1 − SSIM) / 2 (paper, Sec. 6).
@@ -89,14 +95,11 @@ class L1Dssim:
             # Rounding can take SSIM above 1 by 1e-7, and samples are drawn in proportion to this.
             loss = self.l1_weight * l1 + self.dssim_weight * dssim.clamp_min(0)
             if self.relative_weight:
-                difference = self._log(prediction) - self._log(target)
+                offset = self.relative_offset
+                wanted = log_of_radiance(target, offset=offset)
+                difference = log_of_radiance(prediction, offset=offset) - wanted
                 loss = loss + self.relative_weight * difference.abs().mean(dim=(1, 2, 3))
             return loss
-
-    def _log(self, log1p_radiance: Tensor) -> Tensor:
-        """log(r + relative_offset), also where r itself would overflow; of negative r that of 0."""
-        above = log1p_radiance.clamp_min(0)
-        return above + ((self.relative_offset - 1) * (-above).exp()).log1p()
 
     def _planes(self, image: Tensor) -> Tensor:
         """[n, planes, height, width]: the images the window slides over."""

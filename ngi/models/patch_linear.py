@@ -10,8 +10,7 @@ from torch import Tensor, nn
 from torch.autograd.function import once_differentiable
 
 SampleGradients = Callable[[Tensor, Tensor], None]
-"""Is shown a parameter and its gradients for n samples, [n, *parameter.shape]. Where it is called
-again for the same parameter, they are those of further samples of the same batch, in order."""
+"""Is shown a parameter, once, and its gradients for n samples, [n, *parameter.shape]."""
 
 
 class PatchLinear(nn.Linear):

@@ -64,9 +64,9 @@ class PixelEncoding(nn.Module):
     def forward(self, buffers: Tensor, scene_vector: Tensor, precision: torch.dtype) -> Tensor:
         """Buffers [n, p, C] in float32 and v [n, D] to features [n, p, I] in `precision`.
 
-        Rounded to bfloat16 a position alone would move by up to 1/256 of the scene's box; the
+        Rounded to bfloat16 a position alone would move by up to 1/1024 of the scene's box; the
         sines and cosines are made before anything is rounded, and the highest of four octaves
-        tells 1/6000 of the box apart. The number of features is a multiple of 8.
+        tells 1/4000 of the box apart. The number of features is a multiple of 8.
         """
         position = 2 * buffers[..., self._layout.slice("position")] - 1
         others = buffers[..., position.shape[-1] : self._layout.input_channels]

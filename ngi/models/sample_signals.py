@@ -12,7 +12,7 @@ from torch import Tensor, nn
 from ngi.models.loss import SampleLoss
 from ngi.models.patch_linear import PatchLinear
 from ngi.models.pixel_mlp import PixelMLP
-from ngi.models.step_rules import Step, StepRules
+from ngi.models.step_rules import StepRules
 
 
 def output_gradient_norm(prediction: Tensor, target: Tensor, loss: SampleLoss) -> Tensor:
@@ -85,7 +85,8 @@ def step_norms_in_backward(
         by; n where the loss is the mean over n samples
     around: what is entered while the norms are computed, to time them
 
-    Raises as `sample_step_norm`.
+    Raises as `sample_step_norm`, and RuntimeError in the backward pass where a part of the model
+    was called twice.
     """
     parts = _watched_parts(model)
     rules = StepRules(optimizer)
@@ -93,20 +94,19 @@ def step_norms_in_backward(
         raise ValueError(
             "the optimizer does not hold every parameter of the model it is asked about"
         )
-    steps: dict[Tensor, Step] = {}
-    squared_norms: dict[Tensor, list[Tensor]] = {}
+    squared_norms: dict[Tensor, Tensor] = {}
 
     def add_squared_norms(parameter: Tensor, gradients: Tensor) -> None:
         with around(), torch.no_grad():
-            if parameter not in steps:
-                steps[parameter] = rules.step(parameter).scaled(gradient_scale)
-            norms = steps[parameter].squared_norm(gradients)
-            squared_norms.setdefault(parameter, []).append(norms)
+            if parameter in squared_norms:  # whose gradients would be sums over both calls
+                raise RuntimeError("a part of the model is called twice in a pass")
+            step = rules.step(parameter).scaled(gradient_scale)
+            squared_norms[parameter] = step.squared_norm(gradients)
 
     for part in parts:
         part.watcher = add_squared_norms
     try:
-        yield lambda: torch.stack([torch.cat(n) for n in squared_norms.values()]).sum(0).sqrt()
+        yield lambda: torch.stack([*squared_norms.values()]).sum(0).sqrt()
     finally:
         for part in parts:
             part.watcher = None

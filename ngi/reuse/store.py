@@ -177,8 +177,8 @@ class PatchStore:
     def update(self, ids: Tensor, losses: Tensor) -> None:
         """Records the losses [n] of n patches; an id that stands twice keeps the last one.
 
-        NaN and Inf are recorded as 0 and counted, so that such a patch is not drawn; a loss that
-        rounding took below 0 is recorded as 0.
+        NaN and Inf are recorded as 0 and counted: in proportion to its loss such a patch is not
+        drawn. A loss that rounding took below 0 is recorded as 0, too.
         Raises ValueError for ids that are not stored and for other than one loss per id.
         """
         if losses.shape != ids.shape:

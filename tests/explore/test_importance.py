@@ -47,7 +47,7 @@ def test_draws_of_several_keep_to_the_bound() -> None:
     drawn = torch.cat([importance.draw(values, 4, generator)[0] for _ in range(2000)])
     often = np.bincount(drawn.numpy(), minlength=64) / 2000
     assert 5 / 16 < often[0] <= 8 / 16
-    assert often[1:].mean() == pytest.approx((4 - often[0]) / 63)
+    assert stats.chisquare(2000 * often[1:]).pvalue > 0.01  # the rest goes to all others
 
 
 def test_a_bound_that_nothing_reaches_changes_no_bit() -> None:

@@ -182,3 +182,8 @@ def test_of_patches_of_one_image_the_better_are_drawn() -> None:
     drawn = torch.cat([each for each in known if each is not None]).flatten().long()
     shares = drawn.bincount()[1:] / len(drawn)  # of values that are roots: 1 to 4, as they are
     assert shares.tolist() == pytest.approx([0.1, 0.2, 0.3, 0.4], abs=0.025)
+
+
+def test_more_dimensions_than_there_are_sequences_for_are_refused_at_the_start() -> None:
+    with pytest.raises(ValueError, match=r"known for at most 21201; choose"):
+        looking().init(21_202)

@@ -271,3 +271,22 @@ def test_a_training_step_measures_its_own_samples(make_model, make_batch) -> Non
     torch.testing.assert_close(norms(), expected)
     optimizer.step()
     torch.testing.assert_close(norms(), expected)
+
+
+def test_a_part_that_is_called_twice_is_refused() -> None:
+    """Its gradients would be sums over both calls, in which samples are no more told apart."""
+
+    class Twice(nn.Module):
+        def __init__(self) -> None:
+            super().__init__()
+            self.layer = PatchLinear(pixel_features=[3], scene_dimensions=2, out_features=3)
+
+        def forward(self, buffers, scene_vector):
+            once = self.layer([buffers.flatten(1, 2)], scene_vector)
+            return self.layer([once], scene_vector).view(buffers.shape)
+
+    model, generator = Twice(), torch.Generator().manual_seed(0)
+    images = torch.rand(2, 2, 8, 8, 3, generator=generator)
+    batch = Batch(images[0], torch.rand(2, 2, generator=generator), images[1])
+    with pytest.raises(RuntimeError, match="called twice"):
+        step_norms(model, adam(model), batch)
