@@ -1,4 +1,4 @@
-# The two commands that matter: `make demo` and `make test`. Both set everything up by themselves.
+# To begin with: `make view`, `make demo`, `make test`. Each sets everything up by itself.
 
 PYTHON ?= python3
 VENV := .venv
@@ -9,7 +9,7 @@ SWEEPS := same_time preconditioning resolution target_function acceptance histog
 BUDGET ?= small
 OPTIONS ?=
 SCENE ?= living-room
-.PHONY: help setup demo view test report docs lint smoke browser benchmark gpu doctor clean
+.PHONY: help setup demo view test report docs lint smoke browser wheel benchmark gpu doctor clean
 
 help: ## list the commands
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 14
@@ -54,13 +54,23 @@ report: setup ## all sweeps at BUDGET=smoke|small|paper: runs what is missing, b
 	$(BIN)/python -m analysis.report outputs/$(BUDGET)-model-clock && exit $$failed
 
 docs: $(VENV)/.docs ## the documentation as a site in build/site, with warnings as errors
-	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 	@echo "written to build/site/index.html; with search: python3 -m http.server -d build/site"
 
 $(VENV)/.docs: $(VENV)/.complete
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt \
 		--editable '.[docs]'
 	@touch $@
+
+wheel: setup ## the program as one file in build/wheel; a short run from it, outside the repository
+	@rm -rf build/wheel build/installed build/outputs
+	@$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir build/wheel .
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --target build/installed \
+		build/wheel/*.whl
+	@cd build && export PYTHONPATH=$(CURDIR)/build/installed && \
+	../$(BIN)/python -c 'import ngi, sys; sys.exit("build/installed" not in ngi.__file__)' && \
+	../$(BIN)/python -m ngi.train scene=mirror budget=smoke && \
+	../$(BIN)/python -m analysis.report outputs/smoke
 
 benchmark: setup ## speed as ratios, with the machine's own limits measured beside: 15 minutes
 	@$(BIN)/ngi benchmark

@@ -89,7 +89,8 @@ def options() -> str:
         "",
         "## The whole",
         "",
-        "`conf/train.yaml`: the defaults are the paper's.",
+        "`conf/train.yaml`: the paper's settings. A command that names neither `method` nor "
+        "`budget` gets `method=ours budget=machine`.",
         "",
         *_block((ROOT / "conf" / "train.yaml").read_text().split("\nlabel:")[0]),
     ]

@@ -107,7 +107,8 @@ def test_a_run_that_is_opened_lies_where_training_has_put_it(
     monkeypatch.setenv("NGI_SCENES", str(tmp_path))
     trained = [words for c in commands(page) if (words := words_of(c, "train")) is not None]
     jobs = [job for words in trained if "--config-dir" not in words for job in overrides(words)]
-    jobs += [["+sweeps=demo", f"method={name}"] for name in ("uniform", "active_exploration")]
+    methods = ("ours", "uniform", "active_exploration")
+    jobs += [["+sweeps=demo", f"method={name}"] for name in methods]
     folders = {relpath(known_to_hydra(*completed(job)).run.folder) for job in jobs}
     assert shown <= folders
 

@@ -44,6 +44,14 @@ def test_links_lead_somewhere(name: str) -> None:
         assert not anchor or anchor in headings(file), link
 
 
+def test_every_page_can_be_found_in_the_menu() -> None:
+    _, _, menu = (ROOT / "mkdocs.yml").read_text().partition("\nnav:\n")
+    shown = re.findall(r": (\S+\.md)$", menu, flags=re.MULTILINE)
+    written = [str(page.relative_to(ROOT / "docs")) for page in (ROOT / "docs").rglob("*.md")]
+    made = [page for page in shown if page.startswith("reference/")]
+    assert sorted(shown) == sorted({*written, *made})
+
+
 def test_readme_stays_a_front_door() -> None:
     assert len((ROOT / "README.md").read_text().splitlines()) <= 150
 
