@@ -75,6 +75,11 @@ def test_a_frame_of_ours_takes_the_share_of_the_denoisers_time_that_is_said() ->
     assert said("docs/learner/README.md", fewer) == range_of("ours with 8 rays / paths and")
     again = said("README.md", r"half the rays.+? it takes (0\.\d+) to (0\.\d+), and still has less")
     assert again == range_of("ours with 8 rays / paths and")
+    names = ("ours / paths and denoiser", "ours with 8 rays / paths and")
+    both = [figure for name in names for figure in range_of(name, "frames-xeon")]
+    xeon = r"takes (0\.\d+) to (0\.\d+) of the denoiser's time, and (0\.\d+) to (0\.\d+) with 8"
+    assert said("docs/learner/README.md", xeon) == tuple(both)
+    assert said("README.md", r"on an Intel Xeon (0\.\d+) to (0\.\d+);") == tuple(both[:2])
 
 
 @pytest.mark.parametrize("page", ["README.md", "docs/learner/README.md"])
@@ -89,9 +94,9 @@ def test_with_half_the_rays_ours_is_better_on_as_many_scenes_as_is_said(page: st
     assert number == {3: "three", 4: "four", 5: "five"}[better.sum()]
 
 
-def range_of(name: str) -> tuple[str, str]:
+def range_of(name: str, file: str = "frames") -> tuple[str, str]:
     """Smallest and largest median of the frames' figures that are called so."""
-    figures = json.loads((ROOT / "docs/learner/frames.json").read_text())["figures"]
+    figures = json.loads((ROOT / f"docs/learner/{file}.json").read_text())["figures"]
     medians = [figure["median"] for figure in figures if figure["name"].startswith(name)]
     assert len(medians) == 6 * 3
     return f"{min(medians):.2f}", f"{max(medians):.2f}"
