@@ -39,15 +39,16 @@ def does_not_fit(error: RuntimeError) -> bool:
 class FittingTracer(Tracer):
     """The `ngi.render.tracing.Tracer` that halves what another one cannot trace at once.
 
-    First the samples, then the rows. Each half has a seed of its own, which depends on the whole's
-    and on nothing else: the same halves give the same numbers. Launches as large as one that did
-    not fit are not tried again.
+    First the samples, of radiance alone, then the rows. Each half has a seed of its own, which
+    depends on the whole's and on nothing else: the same halves give the same numbers. Launches as
+    large as one that did not fit are not tried again.
 
     tracer: raises RuntimeError, see `does_not_fit`, when it launches.
     free: gives back memory that is kept for later; tried before anything is halved.
     split: how many launches have been halved.
 
-    Raises RuntimeError, saying what to lower, where one sample per pixel of one row does not fit.
+    Raises RuntimeError, saying what to lower, where one row does not fit with one sample per pixel,
+    or with the rays of its buffers.
     """
 
     def __init__(self, tracer: Tracer, *, free: Callable[[], None]) -> None:
@@ -90,7 +91,7 @@ class FittingTracer(Tracer):
             return whole
         return _stacked(
             self.buffers(half, samples=samples)
-            for half in self._counted(pixels.halves(), prod(pixels.shape))
+            for half in self._counted(pixels.halves(), prod(pixels.shape), samples=samples)
         )
 
     def _attempt(self, what: str, size: int, launch: Callable[[], Pending]) -> Pending | None:
@@ -116,12 +117,16 @@ class FittingTracer(Tracer):
         self._too_large[what] = size
         return None
 
-    def _counted(self, halves: tuple[Part, Part] | None, size: int) -> tuple[Part, Part]:
+    def _counted(
+        self, halves: tuple[Part, Part] | None, size: int, *, samples: int = 1
+    ) -> tuple[Part, Part]:
         if halves is None:
+            rays = f"{samples} samples" if samples > 1 else "one sample"
+            fewer = "renderer.buffer_samples, " if samples > 1 else ""
             raise RuntimeError(
-                f"not even {size} pixels with one sample fit into memory; free it "
-                "(`nvidia-smi` says what holds it), lower renderer.workers or the sizes of the "
-                "scene's meshes and textures, or choose renderer.backend=llvm"
+                f"not even {size} pixels with {rays} fit into memory; free it (`nvidia-smi` says "
+                f"what holds it), lower {fewer}renderer.workers or the sizes of the scene's meshes "
+                "and textures, or choose renderer.backend=llvm"
             )
         self.split += 1
         return halves

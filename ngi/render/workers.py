@@ -35,7 +35,9 @@ def mitsuba_renderer(
         raise ValueError(f"renderer.cluster '{cluster}' needs workers; set renderer.workers")
     if workers == 0:
         return kind(**options)
-    variant = activate(options.pop("backend"))  # 'auto' must not come out differently in a worker
+    variant = activate(
+        options.pop("backend", "auto")
+    )  # 'auto' must not come out differently in a worker
     backend = next(name for name in VARIANTS if VARIANTS[name] == variant)
     return WorkerRenderer(
         partial(kind, backend=backend, **options), workers=workers, cluster=cluster

@@ -134,8 +134,11 @@ def test_the_smallest_part_says_what_to_lower() -> None:
         lambda tracer: tracer.radiance(WINDOW, samples=8, seed=0),
         lambda tracer: tracer.buffers(WINDOW, samples=1),
     ):
-        with pytest.raises(RuntimeError, match=r"not even 6 pixels .* lower renderer\.workers"):
+        with pytest.raises(RuntimeError, match=r"6 pixels with one sample .* lower renderer\.work"):
             launch(fitting(5)[1])
+    rays = r"6 pixels with 2 samples fit .* lower renderer\.buffer_samples, renderer\.workers"
+    with pytest.raises(RuntimeError, match=rays):
+        fitting(8)[1].buffers(WINDOW, samples=2)  # which are not split by rays
 
 
 def test_other_errors_are_none_of_its_business() -> None:
