@@ -41,7 +41,7 @@ class VariableScene:
         self._writes = [self._bind(variable) for variable in description.variables]
         self._parameters.forget_the_rest()
         self._values: list[NDArray[np.float64] | None] = [None] * len(self._writes)
-        self._places_camera = [part == description.camera_part for _, part in description.parts()]
+        self._of_cameras = [self._is_of_cameras(variable) for variable in description.variables]
         self.changes = 0
         """How often something else than the camera has changed."""
 
@@ -67,6 +67,12 @@ class VariableScene:
                 f"'{owners[0].id()}' is not rendered, but the first sensor of the file{name} is; "
                 "name that one, or put this one first"
             )
+
+    def _is_of_cameras(self, variable: Variable) -> bool:
+        """Whether it changes what the scene looks like from somewhere, and nothing else."""
+        if isinstance(variable, DiscreteVariable):
+            return False
+        return all(isinstance(owner, mi.Sensor) for owner in self.owners(variable))
 
     @cached_property
     def moving(self) -> frozenset[str]:
@@ -153,6 +159,6 @@ class VariableScene:
                 write(value)
                 self._values[i] = value
                 changed = True
-                self.changes += not self._places_camera[i]
+                self.changes += not self._of_cameras[i]
         if changed:
             self._parameters.update()

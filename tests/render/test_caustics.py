@@ -282,15 +282,17 @@ def test_photons_are_traced_again_where_more_than_the_camera_moves(load, monkeyp
         "{object: camera, property: look_at, minimum: [0, 0, 4, 0, 0, 0], "
         "maximum: [1, 0, 4, 0, 0, 0], up: [0, 1, 0]}"
     )
+    zooms = "{object: camera, property: fov, minimum: 15, maximum: 25}"
     shapes = FLOOR + BULB + rectangle("wall", WALL, MIRROR)
 
     def renderer():
-        return load(shapes, variables=[DIM, walks])
+        return load(shapes, variables=[DIM, walks, zooms])
 
-    seen, vectors = renderer(), ([0.2, 0.0], [0.2, 1.0], [0.9, 1.0], [0.2, 1.0], [0.2, 1.0])
+    dim, bright = ([0.2, 0.0, 0.5], [0.2, 1.0, 0.5], [0.2, 1.0, 0.9]), [0.9, 1.0, 0.9]
+    seen, vectors = renderer(), (*dim, bright, dim[1], dim[1])
     pictures = [(direct(seen, v), len(traced)) for v in vectors]
-    assert [count for _, count in pictures] == [1, 1, 2, 3, 3]
-    fresh = {tuple(v): direct(renderer(), v) for v in vectors[:3]}  # the others repeat one
+    assert [count for _, count in pictures] == [1, 1, 1, 2, 3, 3]
+    fresh = {tuple(v): direct(renderer(), v) for v in vectors[:4]}  # the others repeat one
     for v, (picture, _) in zip(vectors, pictures, strict=True):
         np.testing.assert_array_equal(picture, fresh[tuple(v)])
 
