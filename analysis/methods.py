@@ -92,13 +92,11 @@ def baselines(budgets: Mapping[str, object]) -> list[tuple[str, str]]:
 
     budgets: by method, in order; each method has the baseline of its own budget, where there is one
     """
-    named = [method for method in budgets if is_baseline(method)]
-    if not named:
-        named = [*{budgets[method]: method for method in reversed([*budgets])}.values()][::-1]
-    found = []
+    uniform, found = [method for method in budgets if is_baseline(method)], []
     for method, budget in budgets.items():
-        own = [baseline for baseline in named if budgets[baseline] == budget]
-        found.append((method, (own or named)[0]))
+        alike = [other for other in budgets if budgets[other] == budget]
+        own = [other for other in alike if is_baseline(other)]
+        found.append((method, (own or uniform or alike)[0]))
     return [(method, baseline) for method, baseline in found if method != baseline]
 
 

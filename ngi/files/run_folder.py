@@ -106,10 +106,10 @@ class RunFolder:
         checkpoints = (self.path / name for name in CHECKPOINTS)
         for file in (*checkpoints, self._result, *others):
             file.unlink(missing_ok=True)
-        self.begin_logs()
+        self.forget_logs()
         shutil.rmtree(self.patches, ignore_errors=True)
 
-    def begin_logs(self) -> None:
+    def forget_logs(self) -> None:
         """Deletes what a start left that was never saved: its columns were perhaps other ones."""
         for log in self.logs:
             log.close()

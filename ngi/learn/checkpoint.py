@@ -77,7 +77,7 @@ def prepare_resume(folder: RunFolder) -> Path | None:
             f"{folder.checkpoint.name} back, or {OTHER_FOLDER}"
         )
     if checkpoint is None:
-        folder.begin_logs()
+        folder.forget_logs()
         return None
     if folder.lengthened:
         checkpoint = _before_decay(folder, checkpoint)
@@ -110,8 +110,11 @@ def _newest_usable(folder: RunFolder) -> dict[str, Any] | None:
         os.replace(path, folder.checkpoint)
         return checkpoint
     if problems:
-        afresh = f"delete every checkpoint (*.ckpt) in {folder.path} and the same command starts "
-        remedy = OTHER_FOLDER if folder.lengthened else f"{afresh}the run afresh"
+        afresh = (
+            f"delete every checkpoint (*.ckpt) in {folder.path} and the same command starts the "
+            "run afresh"
+        )
+        remedy = OTHER_FOLDER if folder.lengthened else afresh
         raise ValueError(f"{'; '.join(problems)}; put back a copy, or {remedy}")
     return None
 

@@ -6,7 +6,9 @@ import pytest
 from scipy import stats
 
 from analysis.curves import error_curve
-from analysis.runs import Run
+from analysis.methods import name_methods
+from analysis.plots import error_figure, method_styles, scene_panels
+from analysis.runs import Run, find_runs
 
 
 def run(*values: float) -> Run:
@@ -49,3 +51,22 @@ def test_band_of_differences_is_the_interval_of_the_mean_on_both_sides_of_zero()
     assert curve is not None
     low, high = stats.t.interval(0.95, 2, loc=np.mean(values), scale=stats.sem(values))
     assert (curve.low[0], curve.high[0]) == (pytest.approx(low), pytest.approx(high))
+
+
+def test_relmse_at_or_below_0_is_drawn(make_run, tmp_path) -> None:
+    """The best method's is, by chance; a logarithmic axis would leave it out."""
+    for method, end in (("uniform", 0.01), ("active_exploration", -1e-9)):
+        folder = make_run(method=method)
+        table = pd.read_csv(folder / "metrics.csv")
+        values = np.geomspace(1, 0.01, len(table) - 1).tolist()
+        table.assign(hard_relmse=[*values, end], uniform_relmse=1.0).to_csv(
+            folder / "metrics.csv", index=False
+        )
+    runs = name_methods(find_runs(tmp_path / "runs")[0])
+    panels = [p for p in scene_panels(runs, "hard") if p.metric in ("mape", "relmse")]
+    figure = error_figure([panels], method_styles(runs))
+    errors, signed = figure.axes
+    assert errors.get_yscale() == "log"
+    assert signed.get_yscale() == "symlog"
+    assert signed.get_ylim()[0] < 0
+    assert signed.transData.transform((0, 0.01))[1] < signed.transData.transform((0, 1))[1] - 20

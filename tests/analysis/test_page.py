@@ -14,9 +14,8 @@ import pandas as pd
 import pytest
 from PIL import Image
 
-from analysis.methods import name_methods, title
+from analysis.methods import title
 from analysis.page.images import LARGEST_PICTURE, from_picture
-from analysis.plots import error_figure, method_styles, scene_panels
 from analysis.report import main
 from analysis.runs import find_runs
 from analysis.verdicts import judge
@@ -215,25 +214,6 @@ def test_relmse_has_a_curve_where_it_was_measured(make_run, tmp_path) -> None:
     assert hard.endswith("0.0125")
     (uniform,) = {alt for alt in alts if alt.startswith("noise-free relMSE on uniform")}
     assert float(uniform.rpartition(" ")[2]) == 0.5
-
-
-def test_relmse_at_or_below_0_is_drawn(make_run, tmp_path) -> None:
-    """The best method's is, by chance; a logarithmic axis would leave it out."""
-    for method, end in (("uniform", 0.01), ("active_exploration", -1e-9)):
-        folder = make_run(method=method)
-        table = pd.read_csv(folder / "metrics.csv")
-        values = np.geomspace(1, 0.01, len(table) - 1).tolist()
-        table.assign(hard_relmse=[*values, end], uniform_relmse=1.0).to_csv(
-            folder / "metrics.csv", index=False
-        )
-    runs = name_methods(find_runs(tmp_path / "runs")[0])
-    panels = [p for p in scene_panels(runs, "hard") if p.metric in ("mape", "relmse")]
-    figure = error_figure([panels], method_styles(runs))
-    errors, signed = figure.axes
-    assert errors.get_yscale() == "log"
-    assert signed.get_yscale() == "symlog"
-    assert signed.get_ylim()[0] < 0
-    assert signed.transData.transform((0, 0.01))[1] < signed.transData.transform((0, 1))[1] - 20
 
 
 def test_what_it_shows_is_escaped(make_run, tmp_path) -> None:

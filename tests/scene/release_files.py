@@ -15,6 +15,8 @@ SENSOR = """<sensor type="perspective" id="camera">
 BALL = '<shape type="sphere"><float name="radius" value="0.5"/></shape>'
 GROUP = f'<shape type="shapegroup" id="balls">{BALL}</shape>'
 ROOM = '<shape type="cube"><transform name="to_world"><scale value="6"/></transform></shape>'
+WALL = '<bsdf type="{}" id="var_paint">{}</bsdf><shape type="sphere"><ref id="var_paint"/></shape>'
+WHITE = '<rgb name="reflectance" value="1, 1, 1"/>'
 TETRAHEDRON = """ply
 format ascii 1.0
 comment three corners on the axes

@@ -51,7 +51,7 @@ def run_path_tracing(
     plan = instantiate(config.path_tracing)
     label = {**plain(config.label), **dict.fromkeys(UNUSED, "none"), "seed": config.seed}
     folder.begin(scene_place=scene_place(config))
-    folder.begin_logs()
+    folder.forget_logs()
     record_code_version(folder.path, after_step=0)
     tracker.start(folder=folder.path, settings=folder.settings, label=label)
     timed = _timed(config, plan, renderer)
