@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
+from matplotlib.ticker import FuncFormatter, LogLocator
 from torch import Tensor
 
 from ngi.evaluate import METRICS, tone_map
@@ -121,17 +122,23 @@ def _chains(axes: Axes, visited: Visited, across: Axis, up: Axis) -> None:
     columns = [across.component, up.component]
     if len(visited.states):
         horizontal, vertical = visited.states[:, columns].T.numpy()
+        positive = visited.densities[visited.densities > 0]
         points = axes.scatter(
             horizontal,
             vertical,
             c=visited.densities.numpy(),
             cmap="viridis",
-            norm="log" if (visited.densities > 0).any() else None,
+            norm="log" if len(positive) else None,
             plotnonfinite=True,
             s=9,
         )
-        label = "target density of proposals"  # below, so that curves above are as wide
-        axes.figure.colorbar(points, ax=axes, label=label, orientation="horizontal")
+        if len(positive):
+            label = "target density of proposals"  # below, so that curves above are as wide
+            bar = axes.figure.colorbar(points, ax=axes, label=label, orientation="horizontal")
+            steps = (1.0, 3.0) if positive.max() < 100 * positive.min() else (1.0,)
+            bar.locator = LogLocator(subs=steps, numticks=5)  # there is room for few
+            bar.formatter = FuncFormatter(lambda value, _: f"{value:.1g}")
+            bar.minorticks_off()
     horizontal, vertical = visited.current[:, columns].T.numpy()
     axes.scatter(horizontal, vertical, s=45, facecolors="none", edgecolors="#D55E00")
 
