@@ -2,7 +2,9 @@
 
 Photons start on the specular surfaces, where an emitter is seen from there, and follow the same
 chains as camera rays until they meet something that is not specular. Their numbers come from one
-set of points, as those of direct light: no seed.
+set of points, as those of direct light: no seed. Of point, spot and directional lights there are
+caustics where the surface next to them is not perfectly smooth, as in Mitsuba's path tracer: no
+path from the camera meets them by way of smooth glass or a smooth mirror.
 """
 
 from __future__ import annotations
@@ -31,7 +33,7 @@ class Mirror:
     """A shape with a specular BSDF, and the instance that shows it, if any."""
 
     def __init__(self, shape: mi.Shape, instance: mi.Shape | None) -> None:
-        self._shape = shape
+        self.shape = shape
         self._instance = None if instance is None else mi.traverse(instance)
         # A mesh makes its table of areas at the first use, which a recording would trip over.
         dr.eval(shape.sample_position(0, mi.Point2f(0.5)))
@@ -40,7 +42,7 @@ class Mirror:
         self, numbers: mi.Point2f, active: mi.Bool
     ) -> tuple[mi.Point3f, mi.Normal3f, mi.Float]:
         """A place on it, the normal there, and the density by area."""
-        sample = self._shape.sample_position(0, numbers, active)
+        sample = self.shape.sample_position(0, numbers, active)
         if self._instance is None:
             return sample.p, sample.n, sample.pdf
         to_world = self._instance["to_world"]
@@ -73,12 +75,14 @@ class Caustics:
             point, normal, there = mirror.sample(mi.Point2f(numbers[0], numbers[1]), here)
             start.p = dr.select(here, point, start.p)
             start.n = dr.select(here, normal, start.n)
+            start.shape = dr.select(here, mi.ShapePtr(mirror.shape), start.shape)
             density = dr.select(here, there, density)
         towards, irradiance = scene.sample_emitter_direction(
             start, mi.Point2f(numbers[2], numbers[3]), True
         )
         power = irradiance * dr.abs(dr.dot(start.n, towards.d)) * count / (density * wanted)
         power = dr.select((density > 0) & (towards.pdf > 0), power, 0)
+        power = dr.select(towards.delta & ~_is_rough(start.bsdf()), 0, power)
         ray = start.spawn_ray(towards.d)  # off the surface, and back onto it
         ray.d = -towards.d
         end = self.chain.follow(scene, ray, dr.max(power) > 0)
@@ -100,11 +104,17 @@ class Caustics:
 
 
 def caustics_of(scene: VariableScene, chain: SpecularChain) -> Caustics | None:
-    """None where no shape carries one of the chain's BSDFs, or the scene's paths are too short."""
+    """None where no shape carries one of the chain's BSDFs, where the scene's paths are too short,
+    or all its emitters are points or directions and the chain's BSDFs smooth.
+    """
     bounces = min(chain.maximum_bounces, MAX_BOUNCES)
     if chain.longest_path >= 0:  # of a caustic, one vertex is the surface that it falls on
         bounces = min(bounces, chain.longest_path - 2)
-    specular = [surface.material.bsdf for surface in chain.surfaces]
+    specular = [
+        surface.material.bsdf
+        for surface in chain.surfaces
+        if _is_rough(surface.material.bsdf) or not all(map(_is_delta, scene.scene.emitters()))
+    ]
     mirrors = [
         mirror
         for shape, instance in scene.placed()
@@ -133,6 +143,16 @@ def photon_points() -> list[mi.Float]:
     numbers = [dr.gather(mi.Float, flat, 5 * every + dimension) for dimension in range(5)]
     dr.eval(numbers)
     return numbers
+
+
+def _is_rough(bsdf: mi.BSDF) -> mi.Bool:
+    """Whether it has a value: a smooth one's is a delta function."""
+    return mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+
+
+def _is_delta(emitter: mi.Emitter) -> bool:
+    """Whether it is a point, or shines in one direction alone."""
+    return bool(mi.has_flag(emitter.flags(), mi.EmitterFlags.Delta))
 
 
 def _mirror(shape: mi.Shape, instance: mi.Shape | None) -> Mirror | None:
