@@ -2,8 +2,9 @@
 
 Where the words name no budget, and no method but one of ours, that one (or else `method=ours`) is
 trained at a size that suits this machine: `ngi train scene=X budget.seconds=60` gives the best
-network that it can train in that time. Another method, an experiment, a sweep or another budget,
-once named, is taken at its word.
+network that it can train in that time. Where they name no method, and a budget that is not the
+paper's, it is the one of ours that has the least error there. Another method, an experiment, a
+sweep or another budget, once named, is taken at its word.
 
 What is wrong is said once, with the nearest of what there is.
 """
@@ -33,27 +34,29 @@ from ngi.config.unread_output import readers_may_leave
 
 MULTIRUN = ("-m", "--multirun")
 
-OURS = ("budget=machine", "method=ours")
-"""What is added to the words."""
+BEST_METHOD = {"machine": "ours", "hour": "ours_small_patches", "scarce": "ours_small_patches"}
+"""Of each budget for ours: what has the least error there (docs/guide/sampler.md)."""
 
 CHOOSING = ("experiment", "sweeps", "path_tracing")
 """Groups whose choice says what is trained, and for how long."""
 
 
 def completed(words: Sequence[str]) -> list[str]:
-    """The words of a command line, with `OURS` where they leave method and budget open."""
+    """The words of a command line, with what they leave open of method and budget."""
     named = {
         word.partition("=")[0].lstrip("+"): word.partition("=")[2]
         for word in words
         if "=" in word and not word.startswith("-")
     }
+    budget = named.get("budget", "machine")
     swept = re.sub(r"^choice\((.*)\)$", r"\1", named.get("method", "ours").strip())
     methods = re.split(r"[\s,]+", swept.strip())
     of_others = not all(re.fullmatch(r"ours(_\w+)?(/\w+)?", method) for method in methods)
-    elsewhere = of_others or any(group in named for group in CHOOSING)
-    if named.get("budget", "machine") != "machine" or elsewhere:
+    if budget not in BEST_METHOD or of_others or any(group in named for group in CHOOSING):
         return list(words)
-    return with_overrides(words, *(word for word in OURS if word.split("=")[0] not in named))
+    ours = {"budget": budget, "method": BEST_METHOD[budget]}
+    added = (f"{group}={choice}" for group, choice in ours.items() if group not in named)
+    return with_overrides(words, *added)
 
 
 def in_order(words: Sequence[str]) -> list[str]:

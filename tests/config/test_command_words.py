@@ -24,6 +24,9 @@ from tests.learn.command_line import run
         ),
         ("-m method=choice(ours,uniform)", "-m method=choice(ours,uniform)"),
         ("budget=machine method=uniform", "budget=machine method=uniform"),
+        ("scene=x budget=hour", "method=ours_small_patches scene=x budget=hour"),
+        ("budget=scarce seed=1", "method=ours_small_patches budget=scarce seed=1"),
+        ("budget=scarce method=ours", "budget=scarce method=ours"),
     ],
 )
 def test_ours_is_trained_where_the_words_leave_it_open(words: str, expected: str) -> None:
@@ -40,6 +43,9 @@ def test_ours_is_trained_where_the_words_leave_it_open(words: str, expected: str
         "-m method=ours,active_exploration",
         "method=oursome",
         "method=ours_eager budget=small",
+        "method=active_exploration budget=scarce",
+        "-m +sweeps=ours_hour budget=hour",
+        "-m budget=hour,scarce",
         "experiment=demo",
         "-m +sweeps=same_time",
         "+path_tracing=oidn",
