@@ -108,13 +108,15 @@ def test_the_readme_says_of_predicted_losses_what_their_table_says() -> None:
     *measured, times = said("docs/exploration-ceiling/long/errors.md", row)
     *shown, share = said(
         "README.md",
-        r"(\d+) % ± (\d+) less error on the worst .+ (\d+) % ± (\d+) less on av.+ 1/(\d+) of",
+        r"new .+ (\d+) % ± (\d+) less on the worst .+? (\d+) % ± (\d+) less on av.+, in 1/(\d+) \|",
     )
     assert shown == [f"{float(figure):.0f}" for figure in measured]
     assert share == times
-    eager = r"base .+?predicted loss, eager .+%.+?-\d+\.\d ± \d+\.\d % \| +(\d+\.\d) \|"
-    (ratio,) = said("docs/exploration-ceiling/eager/errors.md", eager)
-    assert said("README.md", r", and in 1/(\d+) with as little") == (f"{float(ratio):.0f}",)
+    eager = rf"base .+?predicted loss, eager .+?{less} \| +{less} \| +(\d+\.\d) \|"
+    *tail, mean, interval, ratio = said("docs/exploration-ceiling/eager/errors.md", eager)
+    assert float(mean) < float(interval)
+    words = r"(\d+) % ± (\d+) less error on the worst frames\]\S+ and as little .+? in 1/(\d+) of"
+    assert said("README.md", words) == tuple(f"{float(each):.0f}" for each in (*tail, ratio))
 
 
 def test_the_readme_says_of_the_oracle_what_the_study_says() -> None:
