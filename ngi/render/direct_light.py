@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from torch.quasirandom import SobolEngine
 
 from ngi.machine.backend import dr, mi
+from ngi.patches import BufferLayout
 
 
 def emission(scene: mi.Scene, hit: mi.SurfaceInteraction3f) -> mi.Color3f:
@@ -44,7 +45,8 @@ def light_points(count: int, emitters: NDArray[np.float64] = _ONE) -> NDArray[np
 
     Each emitter has a whole number of points, at least one, the same in all pixels: by itself an
     emitter of probability 0.1 would be as bright as 2 of 16 points make it. The weight is what its
-    probability is of its share of the points. With fewer points than emitters it is 1.
+    probability is of its share of the points. With fewer points than emitters, some of
+    which then have none, it is 1.
 
     emitters: [e] probability with which each is chosen, see `emitter_probabilities`
     """
@@ -67,6 +69,13 @@ def emitter_probabilities(scene: mi.Scene) -> NDArray[np.float64]:
     """[e], with which `scene.sample_emitter_direction` chooses each; one of 1 where none is."""
     weights = np.array([float(emitter.sampling_weight()) for emitter in scene.emitters()])
     return weights / weights.sum() if weights.sum() > 0 else _ONE
+
+
+def fewest_rays(scene: mi.Scene, layout: BufferLayout) -> int:
+    """Per pixel: one for each emitter that direct light in the buffers is asked of."""
+    if "direct" not in layout.names:
+        return 1
+    return int(np.count_nonzero(emitter_probabilities(scene)))
 
 
 def _shares(emitters: NDArray[np.float64], count: int) -> NDArray[np.int64]:

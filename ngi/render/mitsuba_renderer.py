@@ -13,6 +13,7 @@ from torch import Tensor
 
 from ngi.machine.backend import activate, describe, mi
 from ngi.patches import LOG_RADIANCE
+from ngi.render.direct_light import fewest_rays
 from ngi.render.first_hit import first_hit_of
 from ngi.render.fitting import FittingTracer
 from ngi.render.needs import buffers_are_static
@@ -52,7 +53,7 @@ class MitsubaRenderer(Renderer):
     backend: 'auto', 'cuda', 'llvm' or 'scalar', see `ngi.machine.backend.activate`.
     patch_size: P, pixels along a patch's side.
     samples_per_pixel: of training patches; the scene's own number where None.
-    buffer_samples: rays per pixel of the buffers; `BUFFER_SAMPLES` where None.
+    buffer_samples: rays per pixel of the buffers, `fewest_rays` at least; `BUFFER_SAMPLES` if None.
     specular: 'learned': the buffers are those of the first hit; 'traced': of the first hit that is
         not specular (paper, Fig. 10), see `ngi.render.specular`.
     direct: 'traced': the buffers also hold the direct light, see `ngi.render.direct_light`;
@@ -103,7 +104,8 @@ class MitsubaRenderer(Renderer):
             trace_direct=direct != "learned",
             trace_caustics=direct == "with_caustics",
         )
-        self.buffer_samples = buffer_samples or BUFFER_SAMPLES[self._variant]
+        fewest = self._fewest_rays = fewest_rays(self._scene.scene, first_hit.layout)
+        self.buffer_samples = max(buffer_samples or BUFFER_SAMPLES[self._variant], fewest)
         self._tracer = tracer_of(self._variant, self._scene, first_hit)
         self.layout = first_hit.layout
         self._static = needed_only and buffers_are_static(self._scene, self.layout)
@@ -143,11 +145,9 @@ class MitsubaRenderer(Renderer):
             results[index] = retry[0](), retry[1]()
         masked = [again[place] for place in _broken([results[index] for index in again])]
         for index in masked:
-            radiance, buffers = results[index]
-            results[index] = _masked(radiance), _masked(buffers)
+            results[index] = _masked(results[index][0]), _masked(results[index][1])
         P = self.patch_size
-        parts = 2 if self.halves else 1
-        radiance_tensor = _stack([r for r, _ in results], (P, P, 3 * parts))
+        radiance_tensor = _stack([r for r, _ in results], (P, P, 6 if self.halves else 3))
         means = radiance_tensor.split(3, dim=-1)
         buffer_tensor = _stack([b for _, b in results], (P, P, self.layout.channels))
         return RenderedPatches(
@@ -201,7 +201,7 @@ class MitsubaRenderer(Renderer):
         samples: int | None = None,
         caustics: bool = True,
     ) -> Tensor:
-        samples = self.buffer_samples if samples is None else samples
+        samples = self.buffer_samples if samples is None else max(samples, self._fewest_rays)
         require_positive(resolution=resolution, samples=samples)
         mi.set_variant(self._variant)
         self._scene.apply(scene_vector)
@@ -254,9 +254,8 @@ class MitsubaRenderer(Renderer):
         if not self._static:
             return radiance, self._tracer.buffers(window, samples=self.buffer_samples)
         if resolution not in self._static_buffers:  # of the growing resolutions, the last one
-            self._static_buffers = {
-                resolution: self._whole_buffers(resolution, self.buffer_samples)
-            }
+            whole = self._whole_buffers(resolution, self.buffer_samples)
+            self._static_buffers = {resolution: whole}
         rows = slice(window.y, window.y + window.height)
         columns = slice(window.x, window.x + window.width)
         buffers = self._static_buffers[resolution][rows, columns]

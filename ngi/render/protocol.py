@@ -145,7 +145,7 @@ class Renderer(Protocol):
         """[n, C] float32: what `image_buffers` has at n pixels, without making the others.
 
         pixels: [n] int64 on the CPU, of the image's, counted from 0 row by row; n >= 1
-        samples: as of `image_buffers`
+        samples: as of `image_buffers`, or more where that many do not reach all emitters
         caustics: False leaves their light out, whose photons take most of the time of few pixels
         """
         ...

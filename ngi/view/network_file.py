@@ -281,9 +281,9 @@ def _caustics(max_depth: int) -> str:
     from ngi.render.specular import SPECULAR_ROUGHNESS
 
     return (
-        "caustics are in it: what a diffuse surface sends of the light that conductors and "
-        f"dielectrics of alpha <= {SPECULAR_ROUGHNESS:g} throw onto it, along the stronger branch "
-        f"and over at most {_bounces(MAX_BOUNCES, max_depth, 2)}"
+        "caustics are in it: what a diffuse surface sends of the light that conductors and dielec"
+        f"trics of alpha <= {SPECULAR_ROUGHNESS:g} (> 0 for light without extent) throw onto it, "
+        f"along the stronger branch and over at most {_bounces(MAX_BOUNCES, max_depth, 2)}"
     )
 
 

@@ -272,6 +272,23 @@ def test_lamps_that_are_seldom_chosen_light_the_floor_as_the_others_do(load, bac
     np.testing.assert_allclose(found, alone + other, rtol=0.03)  # each at other places of a pixel
 
 
+@pytest.mark.parametrize("samples", [None, 1])
+def test_every_emitter_has_a_ray_however_few_are_asked_for(load, backend, samples) -> None:
+    """As a glimpse of a patch asks: of four rays and five lamps one is dark everywhere."""
+    bulb = BULB.replace("bulb", "bulb{}").replace('value="6, 4, 2"', 'value="1, 1, 1"')
+    lamps = BULB + "".join(bulb.format(number) for number in range(4))
+    renderer = load(FLOOR + lamps, backend=backend, buffer_samples=2)
+    assert renderer.buffer_samples == 5
+    pixels = torch.tensor([0, 37, RESOLUTION**2 - 1])
+    found = renderer.pixel_buffers(
+        torch.zeros(1), pixels, resolution=RESOLUTION, samples=samples, caustics=False
+    )
+    light = found[:, renderer.layout.slice("direct")].expm1().numpy()
+    floor = on_plane(ORIGIN, rays(RESOLUTION), np.zeros(3), [0, 0, 1])
+    expected = lit_by_the_bulb(floor, [0, 0, 1]) * (1 + 4 / INTENSITY)
+    np.testing.assert_allclose(light, expected.reshape(-1, 3)[pixels], rtol=0.05)  # as above
+
+
 def test_other_words_are_refused(load) -> None:
     with pytest.raises(ValueError, match=r"renderer\.direct 'foo': choose one of learned, "):
         load(FLOOR + BULB, backend="scalar", direct="foo")
