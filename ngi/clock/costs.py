@@ -74,8 +74,11 @@ def components(settings: Mapping[str, Any], *, renderer: Renderer, scored: bool)
         for key, value in settings["data"].items()
         if not key.startswith("_") and key != OF_IMAGES
     }
-    if renderer.halves:  # else nothing: what is measured already stays what it is called
+    # Else nothing, so that what is measured already stays what it is called.
+    if renderer.halves:
         samples["halves"] = True
+    if not (target := settings["data"]["_target_"]).startswith("ngi."):  # a class of one's own
+        samples["samples"] = target
     patches = {
         "patches": sampler["chains"],
         "patch_size": renderer.patch_size,

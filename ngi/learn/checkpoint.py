@@ -123,7 +123,10 @@ def _before_decay(folder: RunFolder, newest: dict[str, Any]) -> dict[str, Any]:
     """What `folder.checkpoint` holds once a longer run can go on from it."""
     step = newest["callbacks"]["BudgetAndCheckpoint"][DECAYS_FROM]
     log.info("%s is trained longer; what it had as its result is made again", folder.path)
-    if step is None or step == newest["global_step"]:
+    if step is None:
+        return newest
+    if step == newest["global_step"]:  # as a start leaves it that is killed below
+        folder.previous_checkpoint.unlink(missing_ok=True)
         return newest
     if step == 0:
         raise ValueError(

@@ -52,6 +52,13 @@ def test_samples_of_several_images_are_rendered_and_trained_on_at_a_price_of_the
         assert len({patches[component], sets[component], fewer[component]}) == 3
 
 
+def test_samples_of_a_class_of_one_s_own_have_a_price_of_their_own() -> None:
+    shipped = keys("method=uniform")
+    own = keys("method=uniform", "data._target_=theirs.TwoRenderings")
+    for component in ("training", "exploring", "rendering"):
+        assert shipped[component] != own[component]
+
+
 def test_the_clock_counts_steps_times_costs() -> None:
     counters = Counters(iteration=10, generated_batches=4, scored_batches=3)
     costs = {

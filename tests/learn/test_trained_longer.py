@@ -148,6 +148,19 @@ def test_without_the_checkpoint_before_the_decay_it_is_refused(copy: Path, probl
     assert contents(copy) == before
 
 
+def test_of_a_start_that_was_killed_no_checkpoint_is_left_whose_rate_had_decayed(
+    copy: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It had put the checkpoint before the decay in the last one's place, and no more."""
+    previous = copy / "run" / "previous.ckpt"
+    shutil.copy(copy / "run" / "stable.ckpt", copy / "run" / "last.ckpt")
+    assert previous.exists()
+    monkeypatch.setattr(RunFolder, "begin", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        train(run(copy, 80, *WSD, FORGETFUL))
+    assert not previous.exists()
+
+
 def test_a_rate_that_falls_from_the_first_step_on_allows_nothing_longer(tmp_path: Path) -> None:
     cosine = ("schedule=cosine", "schedule.warmup_steps=3")
     train(run(tmp_path, 12, *cosine))
