@@ -53,20 +53,15 @@ report: setup ## all sweeps at BUDGET=smoke|small|paper: runs what is missing, b
 	|| failed=1; done; \
 	$(BIN)/python -m analysis.report outputs/$(BUDGET)-model-clock && exit $$failed
 
-docs: $(VENV)/.docs ## the documentation as a site in build/site, with warnings as errors
+docs: setup ## the documentation as a site in build/site, with warnings as errors
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 	@echo "written to build/site/index.html; with search: python3 -m http.server -d build/site"
-
-$(VENV)/.docs: $(VENV)/.complete
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt \
-		--editable '.[docs]'
-	@touch $@
 
 wheel: setup ## the program as one file in build/wheel; a short run from it, outside the repository
 	@rm -rf build/wheel build/installed build/outputs
 	@$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir build/wheel .
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --target build/installed \
-		build/wheel/*.whl
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-compile \
+		--target build/installed build/wheel/*.whl
 	@cd build && export PYTHONPATH=$(CURDIR)/build/installed && \
 	../$(BIN)/python -c 'import ngi, sys; sys.exit("build/installed" not in ngi.__file__)' && \
 	../$(BIN)/python -m ngi.train scene=mirror budget=smoke && \

@@ -1,10 +1,29 @@
 import gc
+from pathlib import Path
+
+import pytest
 
 from tests import quick_files, quick_hydra, quick_kernels
+
+TESTS = Path(__file__).parent
 
 quick_files.use()
 quick_hydra.use()
 quick_kernels.use()
+
+
+LONGEST = (
+    *("render/test_shipped_scenes", "learn/test_killed", "view/test_browser"),
+    *("learn/test_multirun", "learn/test_interruption", "gpu/test_graphs"),
+    *("studies/gpu_check/test_gpu_check", "scene/test_updates_in_kernels"),
+)
+"""Files that take half a minute and more. They begin first, so that none is left alone at the end.
+"""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    files = [TESTS / f"{name}.py" for name in LONGEST]
+    items.sort(key=lambda item: files.index(item.path) if item.path in files else len(files))
 
 
 def pytest_collection_finish() -> None:

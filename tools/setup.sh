@@ -33,7 +33,7 @@ if ! command -v nvidia-smi >/dev/null 2>&1 && [ -z "${PIP_EXTRA_INDEX_URL:-}${PI
         "PIP_EXTRA_INDEX_URL=<PyTorch's CPU index> make avoids that"
 fi
 "$VENV/bin/python" -m pip install --quiet --disable-pip-version-check \
-    --no-compile --constraint constraints.txt --editable '.[dev,joblib,slurm,viewer,video,denoise,export,tensorboard,mlflow]' ||
+    --no-compile --constraint constraints.txt --editable '.[dev,docs,joblib,slurm,viewer,video,denoise,export,tensorboard,mlflow]' ||
     fail "pip could not install the dependencies; its message stands above"
 # On all cores, where pip compiles one file after the other; some are of other versions of Python.
 # Now, because containers often forbid it to later imports; the libraries' own tests are a fifth.

@@ -118,6 +118,7 @@ def _target(name: str, key: str) -> Callable[..., Any]:
     return target
 
 
+@cache
 def _hints(target: Callable[..., Any]) -> dict[str, Any]:
     function = target.__init__ if inspect.isclass(target) else target
     try:

@@ -26,13 +26,10 @@ AIMED_AT = {"writing": 0.3, "at the end": 0.15}
 
 def killed(process: ForkServerProcess, folder: Path, *, after: float, aim: str | None) -> bool:
     """Kills it after some seconds, at the next `moment` aimed at; False where it ended before."""
-    since = time.monotonic()
-    while process.is_alive():
-        due = time.monotonic() - since >= after
-        if due and (aim is None or at(folder, aim)):
-            process.kill()
-            break
+    process.join(timeout=after)
+    while process.is_alive() and not (aim is None or at(folder, aim)):
         time.sleep(0.0005)
+    process.kill()
     process.join()
     assert process.exitcode in (0, -9), process.exitcode
     return process.exitcode != 0
