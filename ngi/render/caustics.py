@@ -124,7 +124,7 @@ def caustics_of(scene: VariableScene, chain: SpecularChain) -> Caustics | None:
     if not mirrors or bounces < 1:
         return None
     return Caustics(
-        replace(chain, maximum_bounces=bounces, highlights=False, photons=True),
+        replace(chain, maximum_bounces=bounces, direct=False, photons=True),
         mirrors,
         [bsdf for bsdf in scene.bsdfs() if _is_of_kind(bsdf, "Principled")],
         IrradiancePictures(scene.description.bounds),

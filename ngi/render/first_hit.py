@@ -13,7 +13,7 @@ from ngi.render.caustics import Caustics, caustics_of
 from ngi.render.direct_light import direct_light, emission
 from ngi.render.materials import Material, collect_materials, evaluate_materials
 from ngi.render.needs import buffer_needs, direct_need, needed_layout
-from ngi.render.specular import SpecularChain, specular_chain
+from ngi.render.specular import ChainEnd, SpecularChain, specular_chain
 from ngi.scene.variable_scene import VariableScene
 
 
@@ -45,6 +45,7 @@ class FirstHit:
         caustics: the pictures of `self.caustics`, whose light is added to the direct light.
         """
         traced: dict[str, list[mi.Float]] = {}
+        end = None
         if self.chain is None:
             hit = scene.ray_intersect(ray)
         else:
@@ -57,13 +58,7 @@ class FirstHit:
             }
         valid = hit.is_valid()
         if "direct" in self.layout.names:
-            direct = direct_light(scene, hit, light_point)
-            if self.caustics is not None:
-                fits = True if self.chain is None else self.chain.lit(end.segments + 1)
-                direct += dr.select(fits, self.caustics.radiance(caustics, hit), 0)
-            if self.chain is not None:
-                direct = dr.select(self.chain.lit(end.segments), end.throughput * direct, 0)
-            traced["direct"] = list(direct)
+            traced["direct"] = list(self._direct(scene, hit, end, light_point, caustics))
         albedo, roughness = evaluate_materials(self.materials, hit, valid)
         buffers = {
             "position": self._normalised(hit.p),
@@ -81,6 +76,27 @@ class FirstHit:
             else:
                 channels += [dr.select(valid, c, mi.Float(0)) for c in buffers[name]]
         return channels
+
+    def _direct(
+        self,
+        scene: mi.Scene,
+        hit: mi.SurfaceInteraction3f,
+        end: ChainEnd | None,
+        light_point: Sequence[mi.Float],
+        caustics: mi.Float | None,
+    ) -> mi.Color3f:
+        """Linear radiance, with what rough surfaces show of emitters: a network can dim it here.
+
+        end: of the chain whose hit it is
+        """
+        direct = direct_light(scene, hit, light_point)
+        fits = self.chain is None or end is None or self.chain.lit(end.segments + 1)
+        if self.caustics is not None:
+            direct += dr.select(fits, self.caustics.radiance(caustics, hit), 0)
+        if self.chain is None or end is None:
+            return direct
+        lit = self.chain.lit(end.segments)
+        return dr.select(lit, end.throughput * direct, 0) + end.blurred
 
     def _normalised(self, position: mi.Point3f) -> mi.Vector3f:
         """Within the bounds."""
@@ -107,7 +123,7 @@ def first_hit_of(
     layout = needed_layout(needs) if needed_only else BufferLayout()
     if trace_direct and (direct_need(scene).needed or not needed_only):
         layout = layout.adding(["direct"])
-    specular = specular_chain(scene, materials, highlights=trace_direct)
+    specular = specular_chain(scene, materials, direct="direct" in layout.names)
     chain = specular if trace_specular else None
     caustics = None
     if trace_caustics and specular is not None and "direct" in layout.names:

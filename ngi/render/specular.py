@@ -36,7 +36,9 @@ class ChainEnd:
     throughput: product of the weights of the bounces, 1 where there was none.
     roughness: sqrt(sum of alpha^2) over the bounces.
     emission: linear radiance of every emitter on the way, the environment included, times the
-        throughput up to it; with highlights, of those in the other directions too.
+        throughput up to it; with direct light, of those in the other directions too.
+    blurred: with direct light, what a rough surface on the way shows of them, in place of emission:
+        as sharp as if it were smooth.
     segments: of the path so far, one more than there were bounces.
     """
 
@@ -45,6 +47,7 @@ class ChainEnd:
     throughput: mi.Color3f
     roughness: mi.Float
     emission: mi.Color3f
+    blurred: mi.Color3f
     segments: mi.UInt32
 
 
@@ -55,7 +58,8 @@ class SpecularChain:
     surfaces: at least one. maximum_bounces: at least 1. longest_path: the scene's max_depth.
     buffers: those that the scene carries because of them. Once there are bounces, the position
         does not tell the outgoing direction any more, nor does the camera's view what is seen.
-    highlights: whether emitters are looked for in the directions that are not followed.
+    direct: whether direct light is traced too. Emitters are then looked for in the directions that
+        are not followed as well.
     photons: whether it is a photon's flux that is carried on, in place of radiance.
     """
 
@@ -63,7 +67,7 @@ class SpecularChain:
     maximum_bounces: int
     longest_path: int
     buffers: tuple[str, ...]
-    highlights: bool
+    direct: bool
     photons: bool = False
 
     def follow(self, scene: mi.Scene, ray: mi.Ray3f, active: bool | mi.Bool = True) -> ChainEnd:
@@ -79,35 +83,35 @@ class SpecularChain:
             met: mi.PreliminaryIntersection3f,
             throughput: mi.Color3f,
             variance: mi.Float,
-            emitted: mi.Color3f,
+            light: tuple[mi.Color3f, mi.Color3f],
             bounces: mi.UInt32,
             active: mi.Bool,
         ) -> tuple[Any, ...]:
             hit = met.compute_surface_interaction(ray, mi.RayFlags.All, active)
-            emitted = emitted + throughput * emission(scene, hit)
+            light = self._added(light, throughput * emission(scene, hit), variance > 0)
             active = active & hit.is_valid() & (bounces < self.maximum_bounces)
             goes_on, (direction, weight), other, alpha = self._bounce(hit, active)
-            if self.highlights:
-                emitted = emitted + throughput * _emission_along(other, scene, hit, goes_on)
-            beyond = hit.spawn_ray(hit.to_world(direction))
-            ray = dr.select(goes_on, beyond, ray)
+            if self.direct and any(surface.branches == 2 for surface in self.surfaces):
+                beside = throughput * _emission_along(other, scene, hit, goes_on)
+                light = self._added(light, beside, variance + alpha > 0)
+            ray = dr.select(goes_on, hit.spawn_ray(hit.to_world(direction)), ray)
             return (
                 ray,
                 dr.select(goes_on, scene.ray_intersect_preliminary(ray, False, goes_on), met),
                 dr.select(goes_on, throughput * weight, throughput),
                 dr.select(goes_on, variance + dr.square(alpha), variance),
-                emitted,
+                light,
                 bounces + 1,
                 goes_on,
             )
 
-        ray, met, throughput, variance, emitted, segments, _ = dr.while_loop(
+        ray, met, throughput, variance, light, segments, _ = dr.while_loop(
             state=(
                 mi.Ray3f(ray),
                 scene.ray_intersect_preliminary(ray, True, active),
                 mi.Color3f(1),
                 mi.Float(0),
-                mi.Color3f(0),
+                (mi.Color3f(0), mi.Color3f(0)),
                 mi.UInt32(0),
                 mi.Bool(active),
             ),
@@ -115,11 +119,23 @@ class SpecularChain:
             body=step,
         )
         hit = met.compute_surface_interaction(ray)
-        return ChainEnd(ray, hit, throughput, dr.sqrt(variance), emitted, segments)
+        return ChainEnd(ray, hit, throughput, dr.sqrt(variance), light[0], light[1], segments)
 
     def lit(self, segments: mi.UInt32) -> mi.Bool:
         """Whether the scene's paths are long enough to bring an emitter's light over one more."""
         return mi.Bool(True) if self.longest_path < 0 else segments < self.longest_path
+
+    def _added(
+        self, light: tuple[mi.Color3f, mi.Color3f], more: mi.Color3f, rough: mi.Bool
+    ) -> tuple[mi.Color3f, mi.Color3f]:
+        """`ChainEnd.emission` and `blurred` so far, and more of them.
+
+        rough: whether a rough surface shows it
+        """
+        sharp, blurred = light
+        if not self.direct:
+            return sharp + more, blurred
+        return sharp + dr.select(rough, 0, more), blurred + dr.select(rough, more, 0)
 
     def _bounce(
         self, hit: mi.SurfaceInteraction3f, active: mi.Bool
@@ -153,14 +169,14 @@ def _emission_along(
 
 
 def specular_chain(
-    scene: VariableScene, materials: list[Material], *, highlights: bool
+    scene: VariableScene, materials: list[Material], *, direct: bool
 ) -> SpecularChain | None:
     """The chains of a scene, or None where nothing in it is specular at any v.
 
     No longer than the scene's paths: what lies beyond them emits nothing in its pictures. Leaves
     the scene at v = 0.
 
-    highlights: see `SpecularChain`; for nothing where no surface has two branches.
+    direct: see `SpecularChain`.
     """
     scene.apply(np.zeros(scene.description.dimensions))  # every roughness at its minimum
     fronts = [material.front for material in materials]
@@ -181,5 +197,4 @@ def specular_chain(
         buffers.append("chain_roughness")
     if scene.scene.environment() or any(shape.is_emitter() for shape in scene.shapes):
         buffers.append("emission")
-    highlights = highlights and any(surface.branches == 2 for surface in surfaces)
-    return SpecularChain(surfaces, bounces, longest_path, tuple(buffers), highlights)
+    return SpecularChain(surfaces, bounces, longest_path, tuple(buffers), direct)

@@ -20,6 +20,7 @@ from ngi.models import EncodedGenerator, PixelGenerator
 from ngi.models.known_light import EMITTER_THRESHOLD
 from ngi.patches import BufferLayout
 from ngi.scene import SceneDescription
+from ngi.view.bounce_rules import caustics_rule, specular_rule
 from ngi.view.run_settings import read_settings
 from ngi.view.trained_run import TrainedRun
 
@@ -127,7 +128,10 @@ AFTER_BOUNCES = {
     "emitter on the ray's way, the environment too, times the throughput up to it",
 }
 """What the channels of `BufferLayout` are; in `AFTER_BOUNCES` where specular bounces are traced."""
-OTHER_BRANCH = "; and of one that a dielectric's weaker branch meets first, times its weight too"
+OTHER_BRANCH = (
+    "; and of one that a dielectric's weaker branch meets first, times its weight too; but what a "
+    "rough surface shows is in 'direct' instead, as sharp as if it were smooth"
+)
 
 PIXELS = (
     "each channel is the mean over the 'buffer_samples' camera rays of a pixel, spread evenly over "
@@ -248,48 +252,12 @@ def _buffer_metadata(run: TrainedRun) -> dict[str, str]:
     max_depth = -1 if run.description is None else run.description.max_depth
     meanings = dict(BUFFERS)
     if "throughput" in layout.names:
-        told["specular"] = _specular_rule(max_depth)
+        told["specular"] = specular_rule(max_depth)
         meanings |= AFTER_BOUNCES
         meanings["emission"] += "" if direct == "learned" else OTHER_BRANCH
-    caustics = _caustics(max_depth) if direct == "with_caustics" else "caustics are not in it"
+    caustics = caustics_rule(max_depth) if direct == "with_caustics" else "caustics are not in it"
     meanings["direct"] += caustics
     return {**told, "buffers": json.dumps(list(_buffers(layout, meanings)))}
-
-
-def _specular_rule(max_depth: int) -> str:
-    """How far `ngi.render.specular` follows a camera ray. max_depth: of the scene, -1: any."""
-    from ngi.render.specular import MAX_SPECULAR_BOUNCES, SPECULAR_ROUGHNESS  # brings Mitsuba
-
-    return (
-        "each camera ray is followed over specular bounces; all channels but throughput, "
-        "chain_roughness and emission are of the hit where they end, the first that is not "
-        "specular. Specular are conductors, dielectrics and thin dielectrics, smooth or of alpha "
-        f"<= {SPECULAR_ROUGHNESS:g} at the hit, which count as smooth; a conductor's back only if "
-        "it is two-sided with the same BSDF on both; none with a bump or normal map, no plastic, "
-        "no principled BSDF. At a dielectric the ray takes the stronger branch by Fresnel's "
-        "equations: reflection if its share is above 0.5, else transmission (a thin one's share "
-        "holds all reflections inside it). The throughput is the product of the weights: the "
-        "share reflected times specular_reflectance, or the rest times specular_transmittance "
-        "and, but for thin ones, (n1 / n2)^2, n1 being the index on the ray's side. The ray "
-        f"ends after {_bounces(MAX_SPECULAR_BOUNCES, max_depth, 1)}, whatever is hit then; "
-        "'direct' is 0 where no segment of the scene's max_depth is left for it"
-    )
-
-
-def _caustics(max_depth: int) -> str:
-    from ngi.render.caustics import MAX_BOUNCES
-    from ngi.render.specular import SPECULAR_ROUGHNESS
-
-    return (
-        "caustics are in it: what a diffuse surface sends of the light that conductors and dielec"
-        f"trics of alpha <= {SPECULAR_ROUGHNESS:g} (> 0 for light without extent) throw onto it, "
-        f"along the stronger branch and over at most {_bounces(MAX_BOUNCES, max_depth, 2)}"
-    )
-
-
-def _bounces(most: int, max_depth: int, others: int) -> str:
-    fewer = f", or {max_depth - others} (max_depth - {others}) if that is fewer"
-    return f"{most} bounces{fewer if max_depth >= 0 else ''}"
 
 
 def _buffers(layout: BufferLayout, meanings: Mapping[str, str]) -> Iterable[dict[str, Any]]:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import torch
 
+from ngi.machine.backend import llvm_problem
 from tests.render.optics import (
     ORIGIN,
     fresnel,
@@ -60,6 +61,38 @@ def test_a_textured_roughness_decides_ray_by_ray(load_specular, backend) -> None
     assert 0.3 < smooth.mean() < 0.7
     np.testing.assert_allclose(seen["roughness"][met][~smooth], 0.3, rtol=1e-4)
     np.testing.assert_allclose(seen["roughness"][met][smooth], 1)
+
+
+def test_what_a_rough_mirror_shows_of_emitters_is_direct_light(load_specular, backend) -> None:
+    """Where a network can dim it: a rough surface blurs a lamp, which the buffers do not."""
+    steel = ROUGH.format(alpha='<float name="alpha" value="0.03"/>')
+    shapes = BACK + SIDE + SKY + rectangle("mirror", TILTED, steel)
+    known, seen = (
+        buffers(load_specular(shapes, backend=backend, buffer_samples=4, direct=direct))
+        for direct in ("learned", "traced")
+    )
+    _, _, _, met = mirror()
+    assert known["emission"][met].min() > 0.05
+    assert (seen["emission"][met] == 0).all()
+    np.testing.assert_allclose(seen["direct"][met], known["emission"][met], rtol=1e-5)
+    beside = (known["chain_roughness"] == 0)[..., 0]
+    assert (seen["direct"][beside] == 0).all()
+    np.testing.assert_array_equal(seen["emission"][beside], known["emission"][beside])
+
+
+def test_what_the_other_branch_of_rough_glass_shows_is_direct_light_too(load_specular) -> None:
+    if (problem := llvm_problem()) is not None:
+        pytest.skip(problem)
+    alpha = '<float name="alpha" value="0.03"/></bsdf>'
+    rough = GLASS.replace('"dielectric"', '"roughdielectric"').replace("</bsdf>", alpha)
+    sharp, blurred = (
+        buffers(load_specular(BACK + SKY + plate, backend="llvm", direct="traced"))
+        for plate in (PLATE, PLATE.replace(GLASS, rough))
+    )
+    _, _, _, met = slab()
+    assert (sharp["direct"][met] == 0).all()
+    assert (blurred["emission"][met] == 0).all()
+    np.testing.assert_allclose(blurred["direct"][met], sharp["emission"][met], rtol=1e-4)
 
 
 def test_roughness_of_a_chain_adds_in_squares(load_specular, backend) -> None:

@@ -56,7 +56,8 @@ def test_a_network_of_ours_says_where_specular_bounces_lead(
     assert "times the throughput" in meanings["emission"]
     assert "weaker branch" in meanings["emission"]
     assert CAUSTICS["with_caustics"] in meanings["direct"]
-    assert "alpha <= 0.125 throw" in meanings["direct"]
+    assert "alpha <= 0.125 (> 0 for light without extent) throw" in meanings["direct"]
+    assert "rough surface shows is in 'direct'" in meanings["emission"]
     assert f"at most 66 bounces, or {fewer - 1} (max_depth - 2) if" in meanings["direct"]
 
 
