@@ -26,8 +26,9 @@ class VideoOptions:
     ngi video run=outputs/demo/sphere-caustic/method=uniform/seed=0 reference=64
     ngi video run=FOLDER beside=OTHER path=hard_frames seconds=20
     ngi video run=FOLDER path=static hard_frame=3 reference=64
+    ngi video run=FOLDER out=film.webp seconds=4 frames_per_second=12   # for a README
 
-    Beside the MP4 file, a JSON file of the same name says what was measured: along a path that
+    Beside the film, a JSON file of the same name says what was measured: along a path that
     moves, the error of the changes from frame to frame (with a reference); where v stands still,
     flicker. `ngi report` tabulates every video*.json below its folder. What was measured is not
     replaced by a video with other options: give that one another name, out=FILE.
@@ -35,8 +36,8 @@ class VideoOptions:
 
     run: str = option("a run's folder, finished or not; of path tracing, finished")
     out: str | None = option(
-        "file to write; null: video_PATH.mp4 in the run's folder, with _3 for hard_frame=3 of a "
-        "static path and _supersampled for such edges",
+        "file to write, .mp4 or .webp; null: video_PATH.mp4 in the run's folder, with _3 for "
+        "hard_frame=3 of a static path and _supersampled for such edges",
         None,
     )
     path: str = option(
@@ -62,13 +63,16 @@ def write_video(options: VideoOptions) -> None:
     Raises ValueError, OSError or RuntimeError, naming key and value, before anything is rendered.
     """
     from ngi.view.mp4 import mp4_file, pyav
+    from ngi.view.webp import webp_file
 
-    pyav()
     out = _out(options)
     _check(options, figures=out.with_suffix(".json"))
+    if out.suffix == ".mp4":
+        pyav()
+    file_of = mp4_file if out.suffix == ".mp4" else webp_file
     with ExitStack() as stack:
         film = _film(options, stack)
-        with mp4_file(out, frames_per_second=options.frames_per_second) as add_frame:
+        with file_of(out, frames_per_second=options.frames_per_second) as add_frame:
             measured = film.shoot(add_frame)
     _write_json(out.with_suffix(".json"), options, film, measured)
     steps = ", ".join(f"step {run.step}" for run in film.runs)
@@ -87,7 +91,7 @@ def _out(options: VideoOptions) -> Path:
 def _check(options: VideoOptions, *, figures: Path) -> None:
     """figures: the JSON file that is to be written"""
     if options.out is not None:
-        check_output(Path(options.out), ".mp4")
+        check_output(Path(options.out), ".mp4", ".webp")
     if figures.exists():
         _check_replaced(options, figures)
     if not options.resolution >= 1 or not options.frames_per_second >= 1:

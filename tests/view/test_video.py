@@ -104,6 +104,22 @@ def test_the_file_is_what_browsers_play(trained: Path, monkeypatch: pytest.Monke
     assert content.index(b"moov") < content.index(b"mdat")  # starts before all of it is there
 
 
+def test_a_webp_file_is_the_same_film_over_and_over(
+    trained: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert video(trained, monkeypatch, "seconds=3") == 0
+    monkeypatch.setattr("ngi.view.mp4.pyav", lambda: pytest.fail("PyAV is not needed"))
+    assert video(trained, monkeypatch, "out=film.webp", "seconds=3") == 0
+    with Image.open("film.webp") as film:
+        assert (film.n_frames, film.info["loop"]) == (3, 0)
+        for number, frame in enumerate(decoded(Path("video.mp4"))):
+            film.seek(number)
+            shown = np.asarray(film.convert("RGB"), dtype=float)
+            assert film.info["duration"] == 1000
+            assert abs(shown - frame[: shown.shape[0], : shown.shape[1]]).mean() < 4
+    assert not list(trained.rglob("*.partial"))
+
+
 def test_run_reference_and_other_run_stand_side_by_side(
     trained: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -211,7 +227,7 @@ def test_pixels_that_a_path_made_nan_come_from_the_other_half(
         (("path=number.txt",), "path: number.txt holds no list of v"),
         (("path=broken.txt",), "path: broken.txt is no JSON file"),
         (("path=static", "hard_frame=10"), "hard_frame: 10; there are 0 to 9"),
-        (("out=video.avi",), "out: 'video.avi' does not end with .mp4"),
+        (("out=video.avi",), "out: 'video.avi' does not end with .mp4 or .webp"),
         (("out=nowhere/video.mp4",), "no folder nowhere"),
         (("resolution=0",), "at least 1"),
         (("frames_per_second=0",), "at least 1"),
