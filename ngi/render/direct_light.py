@@ -29,6 +29,9 @@ def emission(scene: mi.Scene, hit: mi.SurfaceInteraction3f) -> mi.Color3f:
 _SOBOL_DIMENSIONS = (1, 2, 3, 4, 5)
 _ONE = np.ones(1)
 
+MOST_RAYS = 64
+"""Per pixel, that many emitters ask for by themselves; of more, some have none."""
+
 _LEAST_DENSITY = 1e-30
 """What is divided by where a density is 0, so that nothing becomes NaN."""
 
@@ -72,10 +75,12 @@ def emitter_probabilities(scene: mi.Scene) -> NDArray[np.float64]:
 
 
 def fewest_rays(scene: mi.Scene, layout: BufferLayout) -> int:
-    """Per pixel: one for each emitter that direct light in the buffers is asked of."""
+    """Per pixel: one for each emitter that direct light in the buffers is asked of, as far as
+    `MOST_RAYS` go.
+    """
     if "direct" not in layout.names:
         return 1
-    return int(np.count_nonzero(emitter_probabilities(scene)))
+    return min(int(np.count_nonzero(emitter_probabilities(scene))), MOST_RAYS)
 
 
 def _shares(emitters: NDArray[np.float64], count: int) -> NDArray[np.int64]:

@@ -289,6 +289,13 @@ def test_every_emitter_has_a_ray_however_few_are_asked_for(load, backend, sample
     np.testing.assert_allclose(light, expected.reshape(-1, 3)[pixels], rtol=0.05)  # as above
 
 
+def test_a_thousand_emitters_do_not_ask_for_a_thousand_rays(load, backend, monkeypatch) -> None:
+    monkeypatch.setattr("ngi.render.direct_light.MOST_RAYS", 3)
+    bulb = BULB.replace("bulb", "bulb{}")
+    lamps = BULB + "".join(bulb.format(number) for number in range(4))
+    assert load(FLOOR + lamps, backend=backend, buffer_samples=2).buffer_samples == 3
+
+
 def test_other_words_are_refused(load) -> None:
     with pytest.raises(ValueError, match=r"renderer\.direct 'foo': choose one of learned, "):
         load(FLOOR + BULB, backend="scalar", direct="foo")
