@@ -67,8 +67,8 @@ def grow(
     features, thresholds = [], []
     for level in range(depth):
         nodes = 2**level
-        threshold = _thresholds(columns, node, nodes, generator)  # [T, S, nodes]
-        gain = _gains(columns, values, node, threshold, smallest_leaf)
+        threshold = _thresholds(points, node, nodes, generator)  # [T, S, nodes]
+        gain = _gains(points, values, node, threshold, smallest_leaf)
         best, feature = gain.max(dim=1)  # [T, nodes]
         chosen = threshold.gather(1, feature[:, None])[:, 0]
         chosen = torch.where(best > -torch.inf, chosen, torch.inf)
@@ -81,32 +81,48 @@ def grow(
     return Forest(torch.cat(features, dim=1), torch.cat(thresholds, dim=1), mean)
 
 
-def _thresholds(columns: Tensor, node: Tensor, nodes: int, generator: torch.Generator) -> Tensor:
+def _thresholds(points: Tensor, node: Tensor, nodes: int, generator: torch.Generator) -> Tensor:
     """[T, S, nodes] between the samples of each node; NaN or infinite in an empty one."""
-    trees, (dimensions, _) = len(node), columns.shape
-    index = node[:, None].expand(-1, dimensions, -1)
-    spread = columns.expand(trees, -1, -1)
-    shape = trees, dimensions, nodes
-    low = columns.new_full(shape, torch.inf).scatter_reduce(2, index, spread, "amin")
-    high = columns.new_full(shape, -torch.inf).scatter_reduce(2, index, spread, "amax")
-    return low + (high - low) * torch.rand(shape, generator=generator)
+    index, samples = _by_node(points, node, nodes)
+    empty = points.new_full((len(node) * nodes, points.shape[1]), torch.inf)
+    low = _of_trees(empty.scatter_reduce(0, index, samples, "amin"), nodes)
+    high = _of_trees((-empty).scatter_reduce(0, index, samples, "amax"), nodes)
+    return low + (high - low) * torch.rand(low.shape, generator=generator)
 
 
 def _gains(
-    columns: Tensor, values: Tensor, node: Tensor, threshold: Tensor, smallest_leaf: int
+    points: Tensor, values: Tensor, node: Tensor, threshold: Tensor, smallest_leaf: int
 ) -> Tensor:
     """[T, S, nodes]: sum²/count over both children, -inf where one is too small."""
     trees, dimensions, nodes = threshold.shape
-    index = node[:, None].expand(-1, dimensions, -1)
-    right = (columns >= threshold.gather(2, index)).to(values)  # [T, S, m]
-    zero = values.new_zeros(trees, dimensions, nodes)
-    count_right = zero.scatter_add(2, index, right)
-    sum_right = zero.scatter_add(2, index, right * values)
+    index, samples = _by_node(points, node, nodes)
+    thresholds = threshold.transpose(1, 2).reshape(trees * nodes, dimensions)
+    right = (samples >= thresholds[index[:, 0]]).to(values)
+    zero = torch.zeros_like(thresholds)
+    count_right = _of_trees(zero.scatter_add(0, index, right), nodes)
+    right *= values.repeat(trees)[:, None]
+    sum_right = _of_trees(zero.scatter_add(0, index, right), nodes)
     count, total = (sums[:, None] for sums in _sums(values, node, nodes))
     count_left, sum_left = count - count_right, total - sum_right
     gain = sum_left**2 / count_left + sum_right**2 / count_right
     fits = (count_left >= smallest_leaf) & (count_right >= smallest_leaf)
     return torch.where(fits, gain, -torch.inf)
+
+
+def _by_node(points: Tensor, node: Tensor, nodes: int) -> tuple[Tensor, Tensor]:
+    """The samples of every tree one after the other, [T m, S], and in which node each is.
+
+    Rows are added up twice as fast as single numbers are, in the same order.
+    """
+    trees, dimensions = len(node), points.shape[1]
+    index = (node + nodes * torch.arange(trees)[:, None]).flatten()
+    samples = points.expand(trees, -1, -1).reshape(-1, dimensions)
+    return index[:, None].expand(-1, dimensions), samples
+
+
+def _of_trees(rows: Tensor, nodes: int) -> Tensor:
+    """[T, S, nodes] of one row [S] for each node of each tree."""
+    return rows.view(-1, nodes, rows.shape[1]).transpose(1, 2)
 
 
 def _sums(values: Tensor, node: Tensor, nodes: int) -> tuple[Tensor, Tensor]:
