@@ -1,0 +1,56 @@
+"""What docs/exploration-ceiling/small-patches.md says of ten minutes is what their runs say."""
+
+import pandas as pd
+import pytest
+
+from tests.docs.tables import as_shown, in_words, over_scenes, rows_of, tenths
+from tests.docs.test_figures import said
+from tests.docs.test_from_buffers import FOLDER, errors_of
+
+PAGE = "docs/exploration-ceiling/small-patches.md"
+SECTION = "After the same ten minutes"
+
+
+def ends() -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Of uniform sampling and of small patches, by scene and seed."""
+    runs = pd.read_csv(FOLDER / "scarce_same_time.csv")
+    last = runs.groupby(["scene", "seed", "method"]).tail(1).set_index(["scene", "seed"])
+    assert last.run_seconds.tolist() == pytest.approx([600] * len(last), rel=0.03)
+    uniform, small = (last[last.method == f"ours_{name}"] for name in ("uniform", "small_patches"))
+    return uniform.sort_index(), small.sort_index()
+
+
+def test_the_table_says_what_the_runs_say() -> None:
+    uniform, small = ends()
+    rows = []
+    for scene, before in uniform.groupby("scene"):
+        now = small.loc[[scene]]
+        counts = [
+            f"{runs[column].iloc[0]:,}"
+            for column in ("step", "patches_traced")
+            for runs in (before, now)
+        ]
+        errors = zip(errors_of(before), errors_of(now), strict=True)
+        rows.append([*counts, *(tenths(b.iloc[0] / a.iloc[0] - 1) for a, b in errors)])
+    found = [over_scenes(a, b) for a, b in zip(*map(errors_of, (uniform, small)), strict=True)]
+    mean = [as_shown(each).replace(" %", "") for each in found]
+    assert rows_of(PAGE, SECTION)[2:] == [*rows, ["", "", "", "", *mean]]
+
+
+def test_the_pages_say_the_means_of_the_table() -> None:
+    uniform, small = ends()
+    pairs = zip(*map(errors_of, (uniform, small)), strict=True)
+    hard, *others = (in_words(over_scenes(before, now)) for before, now in pairs)
+    number = r"(\d+\.\d % ± \d+\.\d)"
+    assert said(PAGE, rf"After the same ten minutes they have {number} less error") == (hard,)
+    words = rf"and {number} less on their worst pixels; on uniform frames {number} and {number}"
+    assert said(PAGE, words) == tuple(others)
+    for page in ("README.md", "docs/guide/sampler.md", "CHANGELOG.md"):
+        assert said(page, rf"after the same ten minutes {number} less") == (hard,)
+
+
+def test_what_looking_takes_is_what_the_runs_say() -> None:
+    _, small = ends()
+    shares = 100 * small.explore_seconds / small.run_seconds
+    expected = f"{shares.min():.1f}", f"{shares.max():.1f}"
+    assert said(PAGE, r"Looking took ([\d.]+) to ([\d.]+) % of the time") == expected
