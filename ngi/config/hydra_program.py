@@ -3,7 +3,7 @@
 Where the words name no budget, and no method but one of ours, that one (or else `method=ours`) is
 trained at a size that suits this machine: `ngi train scene=X budget.seconds=60` gives the best
 network that it can train in that time. Where they name no method, and a budget that is not the
-paper's, it is the one of ours that has the least error there. Another method, an experiment, a
+paper's, it is the one of ours that had the least error there. Another method, an experiment, a
 sweep or another budget, once named, is taken at its word.
 
 What is wrong is said once, with the nearest of what there is.
@@ -35,7 +35,9 @@ from ngi.config.unread_output import readers_may_leave
 MULTIRUN = ("-m", "--multirun")
 
 BEST_METHOD = {"machine": "ours", "hour": "ours_small_patches", "scarce": "ours_small_patches"}
-"""Of each budget for ours: what has the least error there (docs/guide/sampler.md)."""
+"""Of each budget for ours: what had the least error there, scene by scene, of what was tried
+(docs/guide/sampler.md).
+"""
 
 CHOOSING = ("experiment", "sweeps", "path_tracing")
 """Groups whose choice says what is trained, and for how long."""

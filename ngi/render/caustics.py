@@ -110,11 +110,9 @@ def caustics_of(scene: VariableScene, chain: SpecularChain) -> Caustics | None:
     bounces = min(chain.maximum_bounces, MAX_BOUNCES)
     if chain.longest_path >= 0:  # of a caustic, one vertex is the surface that it falls on
         bounces = min(bounces, chain.longest_path - 2)
-    specular = [
-        surface.material.bsdf
-        for surface in chain.surfaces
-        if _is_rough(surface.material.bsdf) or not all(map(_is_delta, scene.scene.emitters()))
-    ]
+    specular = [surface.material.bsdf for surface in chain.surfaces]
+    if all(map(_is_delta, scene.scene.emitters())):
+        specular = list(filter(_is_rough, specular))
     mirrors = [
         mirror
         for shape, instance in scene.placed()

@@ -1,15 +1,15 @@
 """Animated WebP pictures, which pages and READMEs show where they show no video."""
 
-import os
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from ngi.files.durable import PARTIAL_SUFFIX
+from ngi.files.durable import write_atomically
 from ngi.view.mp4 import AddFrame
 
 QUALITY = 90
@@ -29,20 +29,16 @@ def webp_file(path: Path, *, frames_per_second: int) -> Iterator[AddFrame]:
         frames.append(Image.fromarray(picture))
 
     yield add
-    partial = path.with_name(path.name + PARTIAL_SUFFIX)
-    try:
-        frames[0].save(
-            partial,
-            "WEBP",
-            save_all=True,
-            append_images=frames[1:],
-            duration=round(1000 / frames_per_second),
-            loop=0,
-            quality=QUALITY,
-            kmin=0,
-            kmax=1,  # each frame by itself: what differences leave behind shows on walls
-        )
-        os.replace(partial, path)
-    finally:
-        with suppress(OSError):
-            partial.unlink()
+    content = BytesIO()
+    frames[0].save(
+        content,
+        "WEBP",
+        save_all=True,
+        append_images=frames[1:],
+        duration=round(1000 / frames_per_second),
+        loop=0,
+        quality=QUALITY,
+        kmin=0,
+        kmax=1,  # each frame by itself: what differences leave behind shows on walls
+    )
+    write_atomically(path, content.getvalue())

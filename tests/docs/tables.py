@@ -1,5 +1,7 @@
 """Tables and differences as pages have them."""
 
+from pathlib import Path
+
 import pandas as pd
 
 from analysis.statistics import Estimate, difference_over_scenes, paired_difference
@@ -11,6 +13,14 @@ def rows_of(page: str, section: str) -> list[list[str]]:
     text = (ROOT / page).read_text().split(f"## {section}")[1].split("\n## ")[0]
     lines = [line.replace("*", "") for line in text.splitlines() if line.startswith("| ")]
     return [[cell.strip() for cell in line.split("|")[2:-1]] for line in lines]
+
+
+def ends_of(file: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """The last evaluations of uniform sampling and of small patches, by scene and seed."""
+    runs = pd.read_csv(file)
+    last = runs.groupby(["scene", "seed", "method"]).tail(1).set_index(["scene", "seed"])
+    uniform, small = (last[last.method == f"ours_{name}"] for name in ("uniform", "small_patches"))
+    return uniform.sort_index(), small.sort_index()
 
 
 def tenths(change: float) -> str:

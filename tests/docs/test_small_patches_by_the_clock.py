@@ -3,7 +3,7 @@
 import pandas as pd
 import pytest
 
-from tests.docs.tables import as_shown, in_words, over_scenes, rows_of, tenths
+from tests.docs.tables import as_shown, ends_of, in_words, over_scenes, rows_of, tenths
 from tests.docs.test_figures import said
 from tests.docs.test_from_buffers import FOLDER, errors_of
 
@@ -13,11 +13,10 @@ SECTION = "After the same ten minutes"
 
 def ends() -> tuple[pd.DataFrame, pd.DataFrame]:
     """Of uniform sampling and of small patches, by scene and seed."""
-    runs = pd.read_csv(FOLDER / "scarce_same_time.csv")
-    last = runs.groupby(["scene", "seed", "method"]).tail(1).set_index(["scene", "seed"])
-    assert last.run_seconds.tolist() == pytest.approx([600] * len(last), rel=0.03)
-    uniform, small = (last[last.method == f"ours_{name}"] for name in ("uniform", "small_patches"))
-    return uniform.sort_index(), small.sort_index()
+    uniform, small = ends_of(FOLDER / "scarce_same_time.csv")
+    for runs in (uniform, small):
+        assert runs.run_seconds.tolist() == pytest.approx([600] * len(runs), rel=0.03)
+    return uniform, small
 
 
 def test_the_table_says_what_the_runs_say() -> None:

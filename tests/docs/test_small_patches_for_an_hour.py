@@ -4,12 +4,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.docs.tables import as_shown, over_scenes, rows_of, tenths
+from tests.docs.tables import as_shown, ends_of, over_scenes, rows_of, tenths
 from tests.docs.test_figures import geometric_mean, said
 from tests.docs.test_from_buffers import FOLDER, FRAMES, errors_of
 
 PAGE = "docs/exploration-ceiling/small-patches.md"
 SECTION = "For an hour"
+HOURS = "hour_same_time.csv"
 
 
 def curves_of(runs: pd.DataFrame) -> pd.DataFrame:
@@ -69,7 +70,7 @@ def test_what_looking_takes_is_what_the_run_says() -> None:
 
 def rows_of_the_clock(scene: str) -> list[list[str]]:
     """After each quarter of the hour."""
-    runs = pd.read_csv(FOLDER / "hour_same_time.csv")
+    runs = pd.read_csv(FOLDER / HOURS)
     runs = runs[runs.scene == scene].set_index("method")
     uniform, small = (runs.loc[f"ours_{name}"] for name in ("uniform", "small_patches"))
     assert len(uniform) == len(small) == 12
@@ -113,17 +114,10 @@ def test_what_an_hour_of_the_clock_gives_is_what_its_runs_say() -> None:
         assert said(page, words) == tuple(hard)
 
 
-def ends_of_the_clock() -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Of uniform sampling and of small patches, by scene and seed."""
-    runs = pd.read_csv(FOLDER / "hour_same_time.csv")
-    last = runs.groupby(["scene", "method"]).tail(1).set_index(["scene", "seed"])
-    uniform, small = (last[last.method == f"ours_{name}"] for name in ("uniform", "small_patches"))
-    assert sorted(uniform.index.get_level_values("scene")) == sorted(SCENES)
-    return uniform, small
-
-
 def test_the_mean_over_the_scenes_is_that_of_their_ends() -> None:
-    found = [over_scenes(a, b) for a, b in zip(*map(errors_of, ends_of_the_clock()), strict=True)]
+    uniform, small = ends_of(FOLDER / HOURS)
+    assert sorted(uniform.index.get_level_values("scene")) == sorted(SCENES)
+    found = [over_scenes(a, b) for a, b in zip(*map(errors_of, (uniform, small)), strict=True)]
     shown = [as_shown(each).removesuffix(" (3)").replace(" %", "") for each in found]
     number = r"(−[\d.]+) % (± [\d.]+)"
     said_of = said(PAGE, rf"it is {number} and {number}, and {number} and {number} on uniform")
@@ -137,7 +131,7 @@ def test_the_mean_over_the_scenes_is_that_of_their_ends() -> None:
 
 
 def test_when_uniform_sampling_s_end_is_reached_is_what_the_runs_say() -> None:
-    runs = pd.read_csv(FOLDER / "hour_same_time.csv")
+    runs = pd.read_csv(FOLDER / HOURS)
     runs["hard"] = geometric_mean(runs, "hard")
     minutes = {}
     for scene, own in runs.groupby("scene"):
@@ -156,7 +150,7 @@ def test_when_uniform_sampling_s_end_is_reached_is_what_the_runs_say() -> None:
 
 
 def test_what_looking_takes_of_an_hour_is_what_the_runs_say() -> None:
-    _, small = ends_of_the_clock()
+    _, small = ends_of(FOLDER / HOURS)
     shares = 100 * small.explore_seconds / small.run_seconds
     expected = f"{shares.min():.1f}", f"{shares.max():.1f}"
     assert said(PAGE, r"Looking takes ([\d.]+) to ([\d.]+) % of the time") == expected
