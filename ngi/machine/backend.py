@@ -10,9 +10,11 @@ import logging
 import os
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from ctypes import CDLL
 from functools import cache
+from threading import RLock
 
 from ngi.machine.llvm import INSTALL_COMMAND, find_llvm, llvm_candidates
 
@@ -38,12 +40,16 @@ if _llvm is not None:
 import drjit as dr  # noqa: E402
 import mitsuba as mi  # noqa: E402
 
-if dr.thread_count() < 2:
-    # On one core Dr.Jit has no worker thread, and Mitsuba 3.9 waits for one for ever with every EXR
-    # file that it reads or writes (docs/upstream.md).
-    dr.set_thread_count(2)
-
-__all__ = ["VARIANTS", "activate", "cuda_problem", "describe", "dr", "llvm_problem", "mi"]
+__all__ = [
+    "VARIANTS",
+    "a_worker_thread",
+    "activate",
+    "cuda_problem",
+    "describe",
+    "dr",
+    "llvm_problem",
+    "mi",
+]
 
 VARIANTS = {"cuda": "cuda_ad_rgb", "llvm": "llvm_ad_rgb", "scalar": "scalar_rgb"}
 """Backend -> Mitsuba variant. The wheels of Mitsuba 3.9 hold no JIT variant without `ad`."""
@@ -56,6 +62,29 @@ mi.set_variant("cuda_ad_rgb")
 scene = mi.load_dict({"type": "scene", "sphere": {"type": "sphere"}})
 assert abs(scene.ray_intersect(mi.Ray3f([0, 0, 4], [0, 0, -1])).t[0] - 3) < 1e-3
 """
+
+
+_one_at_a_time = RLock()
+
+
+@contextmanager
+def a_worker_thread() -> Iterator[None]:
+    """Around whatever may read or write an EXR file: then Dr.Jit has a worker thread.
+
+    On one core it has none, and Mitsuba 3.9 waits for one for ever with every such file
+    (docs/upstream.md). Beside a renderer on one core a worker only takes its time: it waits by
+    asking again and again, a third of what a patch takes.
+    """
+    with _one_at_a_time:
+        threads = dr.thread_count()
+        if threads > 1:
+            yield
+            return
+        dr.set_thread_count(2)
+        try:
+            yield
+        finally:
+            dr.set_thread_count(threads)
 
 
 def activate(backend: str = "auto") -> str:

@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 
 from ngi.files.durable import DamagedError, write_atomically
-from ngi.machine.backend import activate, mi
+from ngi.machine.backend import a_worker_thread, activate, mi
 
 LARGEST_HALF = 65504.0
 """The largest finite number of 16 bits."""
@@ -28,7 +28,8 @@ def write_exr(path: Path, radiance: Tensor, *, half: bool = False) -> None:
     if half and not ((pixels.abs() > LARGEST_HALF) & pixels.isfinite()).any():
         bitmap = bitmap.convert(component_format=mi.Struct.Type.Float16, srgb_gamma=False)
     stream = mi.MemoryStream()
-    bitmap.write(stream, mi.Bitmap.FileFormat.OpenEXR)
+    with a_worker_thread():
+        bitmap.write(stream, mi.Bitmap.FileFormat.OpenEXR)
     write_atomically(path, stream.raw_buffer())
 
 
@@ -39,9 +40,9 @@ def read_exr(path: Path) -> Tensor:
     """
     _need_a_variant()
     try:
-        bitmap = mi.Bitmap(str(path)).convert(
-            component_format=mi.Struct.Type.Float32, srgb_gamma=False
-        )
+        with a_worker_thread():
+            bitmap = mi.Bitmap(str(path))
+        bitmap = bitmap.convert(component_format=mi.Struct.Type.Float32, srgb_gamma=False)
     except RuntimeError as error:
         raise DamagedError(f"{path} cannot be read ({error})") from error
     pixels = torch.from_numpy(np.array(bitmap))

@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from ngi.machine.backend import mi
+from ngi.machine.backend import a_worker_thread, mi
 from ngi.scene import srgb
 from ngi.scene.loading import without_place
 from ngi.scene.parameters import Parameters
@@ -33,9 +33,9 @@ class Bitmap:
         """The numbers of a file; ValueError where it is of another size or kind."""
         bits = {"TensorXu8": "auto", "TensorXf16": "fp16"}.get(self._kind.__name__, "variant")
         options = {"raw": self._raw, "format": bits}
-        data = mi.traverse(mi.load_dict({"type": "bitmap", "filename": str(path), **options}))[
-            "data"
-        ]
+        with a_worker_thread():
+            texture = mi.load_dict({"type": "bitmap", "filename": str(path), **options})
+        data = mi.traverse(texture)["data"]
         if type(data) is not self._kind or np.shape(data) != self.shape:
             raise ValueError(
                 f"{path}: an image of {_size(np.shape(data), type(data))}, but the bitmap of "
@@ -109,7 +109,8 @@ def _shape(document: SceneFile, object_id: str) -> ElementTree.Element:
 def _loaded(document: SceneFile, element: ElementTree.Element) -> mi.Object:
     alone = copy.deepcopy(element)
     alone.set("version", document.root.get("version", "3.0.0"))
-    return mi.load_string(ElementTree.tostring(alone, encoding="unicode"), optimize=False)
+    with a_worker_thread():
+        return mi.load_string(ElementTree.tostring(alone, encoding="unicode"), optimize=False)
 
 
 def _size(shape: tuple[int, ...], kind: type) -> str:

@@ -8,7 +8,7 @@ from difflib import get_close_matches
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from ngi.machine.backend import mi
+from ngi.machine.backend import a_worker_thread, mi
 from ngi.scene.scene_files import SceneFile, file_references
 from ngi.scene.xml_file import named, outwards, parents_in
 
@@ -111,6 +111,7 @@ def load(document: SceneFile) -> mi.Scene:
     # Side by side, materials would get their numbers in another order each time, and those are
     # compiled into kernels, which the next process would not find again.
     try:
-        return mi.load_string(text, optimize=False, parallel=False)
+        with a_worker_thread():
+            return mi.load_string(text, optimize=False, parallel=False)
     except RuntimeError as error:
         raise ValueError(in_words(str(error), text, copied)) from error
