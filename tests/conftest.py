@@ -34,12 +34,3 @@ def pytest_collection_finish() -> None:
     """
     gc.collect()
     gc.freeze()
-    _have_a_worker_thread()
-
-
-def _have_a_worker_thread() -> None:
-    """On one core, too: tests ask Mitsuba itself for EXR files, see `backend.a_worker_thread`."""
-    from ngi.machine.backend import dr
-
-    if dr.thread_count() < 2:
-        dr.set_thread_count(2)

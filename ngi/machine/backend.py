@@ -40,6 +40,11 @@ if _llvm is not None:
 import drjit as dr  # noqa: E402
 import mitsuba as mi  # noqa: E402
 
+_most_threads = os.environ.get("OMP_NUM_THREADS", "").partition(",")[0].strip()
+if _most_threads.isdecimal() and 0 < int(_most_threads) < dr.thread_count():
+    # Who limits PyTorch so, as launchers of several runs on one machine do, means Dr.Jit as well.
+    dr.set_thread_count(int(_most_threads))
+
 __all__ = [
     "VARIANTS",
     "a_worker_thread",

@@ -5,11 +5,13 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
+import torch
 import yaml
 from PIL import Image
 from scipy import stats
 
-from ngi.machine.backend import activate, mi
+from ngi.machine.backend import mi
+from ngi.render.exr import write_exr
 
 SCENES = Path(__file__).parent / "scenes"
 RENDERINGS = 12
@@ -56,8 +58,7 @@ def write_assets(folder) -> None:
         Image.fromarray(pixels).save(folder / f"{name}.png")
     sky = random.uniform(0.1, 0.5, (4, 8, 3)).astype(np.float32)
     sky[1, 2] = 4
-    activate("scalar")
-    mi.Bitmap(sky).write(str(folder / "sky.exr"))
+    write_exr(folder / "sky.exr", torch.from_numpy(sky))
 
 
 def write_scene(folder, assets, name, variables, *, dimensions, edit=None):

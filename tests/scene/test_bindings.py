@@ -5,9 +5,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+import torch
 from PIL import Image
 
 from ngi.machine.backend import activate, mi
+from ngi.render.exr import write_exr
 from ngi.scene import read_scene
 from ngi.scene.variable_scene import VariableScene
 from tests.scene.stage import curtain, find, write_ply
@@ -94,7 +96,7 @@ def grey_image(folder) -> None:
 
 def linear_image(folder) -> None:
     activate("scalar")
-    mi.Bitmap(np.zeros((4, 6, 3), np.float32)).write(str(folder / "linear.exr"))
+    write_exr(folder / "linear.exr", torch.zeros(4, 6, 3))
 
 
 def broken_mesh(folder) -> None:

@@ -6,9 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 import yaml
 
-from ngi.machine.backend import activate, mi
+from ngi.machine.backend import a_worker_thread, activate, mi
+from ngi.render.exr import write_exr
 from ngi.scene import KINDS, read_scene
 from ngi.scene.offered import EVERYWHERE, GROUPS, REFUSED, advice
 from ngi.scene.variable_scene import VariableScene
@@ -85,7 +87,7 @@ def folder(tmp_path) -> Path:
     generator = np.random.default_rng(0)
     for name in "ab":
         image = generator.random((8, 16, 3)).astype(np.float32)
-        mi.Bitmap(image).write(str(tmp_path / f"{name}.exr"))
+        write_exr(tmp_path / f"{name}.exr", torch.from_numpy(image))
         corners = generator.random((3, 3))
         write_ply(tmp_path / f"{name}.ply", corners, [(0, 1, 2)], normals=np.eye(3) + corners)
     (tmp_path / "curve.txt").write_text("".join(f"{i} 0 0 0.1\n" for i in range(4)))
@@ -139,7 +141,9 @@ def test_every_parameter_is_named(folder, group, plugin, parameters) -> None:
         text = f'<scene version="3.0.0">{element(group, plugin, inside)}</scene>'
         path = folder / "scene.xml"
         path.write_text(text)
-        found |= own_parameters(mi.load_file(str(path), optimize=False))
+        with a_worker_thread():
+            scene = mi.load_file(str(path), optimize=False)
+        found |= own_parameters(scene)
     assert found - set(EVERYWHERE.get(group, {})) == set(parameters)
 
 

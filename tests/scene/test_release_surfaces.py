@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+import torch
 from numpy.testing import assert_allclose
 
 from ngi.machine.backend import activate, mi
+from ngi.render.exr import write_exr
 from tests.scene.release_files import WALL, WHITE, Loaded, read, tags
 
 
@@ -51,7 +53,7 @@ def test_the_colour_of_glass_is_that_of_its_reflection(tmp_path, kind) -> None:
 )
 def test_whatever_is_a_bitmap_has_a_factor(tmp_path, kind, name) -> None:
     image = np.full((4, 4, 3), 0.5, dtype=np.float32)
-    mi.Bitmap(image).write(str(tmp_path / "grey.exr"))
+    write_exr(tmp_path / "grey.exr", torch.from_numpy(image))
     file = '<string name="filename" value="grey.exr"/>'
     texture = f'<texture type="bitmap" name="{name}">{file}</texture>'
     parameters = Loaded(
@@ -91,7 +93,7 @@ def pictures(folder) -> str:
     elements = []
     for name, size, colour in [("red", 4, (0.8, 0, 0)), ("green", 8, (0, 0.4, 0))]:
         image = np.ones((size, size, 3), dtype=np.float32) * np.array(colour, dtype=np.float32)
-        mi.Bitmap(image).write(str(folder / f"{name}.exr"))
+        write_exr(folder / f"{name}.exr", torch.from_numpy(image))
         file = f'<string name="filename" value="{name}.exr"/>'
         elements.append(f'<texture type="bitmap" name="reflectance">{file}</texture>')
     return "".join(elements)
@@ -143,7 +145,7 @@ def test_the_colour_is_a_factor_on_linear_light_where_the_texture_has_8_bits(tmp
 
 
 def test_a_texture_that_others_refer_to_keeps_its_colour_there(tmp_path) -> None:
-    mi.Bitmap(np.full((4, 4, 3), 0.5, dtype=np.float32)).write(str(tmp_path / "grey.exr"))
+    write_exr(tmp_path / "grey.exr", torch.full((4, 4, 3), 0.5))
     shared = '<texture type="bitmap" id="grey"><string name="filename" value="grey.exr"/></texture>'
     reference = '<ref id="grey" name="reflectance"/>'
     other = (

@@ -5,9 +5,11 @@ import re
 
 import numpy as np
 import pytest
+import torch
 from numpy.testing import assert_allclose
 
 from ngi.machine.backend import activate, mi
+from ngi.render.exr import write_exr
 from tests.scene.release_files import BALL, ROOM, SENSOR, WALL, WHITE, Loaded, read, tags
 
 LAMP = """<emitter type="area" id="var_lamp"><rgb name="radiance" value="1, 2, 3"/>{}</emitter>
@@ -80,7 +82,7 @@ def test_emission_may_be_authored_in_any_way(tmp_path, authored) -> None:
 
 def test_environment_turns_about_y(tmp_path) -> None:
     """The authored to_world is replaced, as in the released renderer."""
-    mi.Bitmap(np.ones((8, 16, 3), dtype=np.float32)).write(str(tmp_path / "sky.exr"))
+    write_exr(tmp_path / "sky.exr", torch.ones(8, 16, 3))
     sky = """<emitter type="envmap" id="var_sky"><string name="filename" value="sky.exr"/>
       <transform name="to_world"><rotate x="1" angle="77"/></transform></emitter>"""
     loaded = Loaded(read(tmp_path, BALL + sky))

@@ -4,8 +4,10 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+import torch
 
-from ngi.machine.backend import activate, mi
+from ngi.machine.backend import activate
+from ngi.render.exr import write_exr
 from tests.scene.stage import find, set_value
 from tests.scene.updates import Update, check_update
 
@@ -145,7 +147,7 @@ WAYS = {
 def write_texels(folder) -> None:
     activate("scalar")
     linear = (0.1 + 0.8 * np.array(TEXELS)).reshape(*SIZE, 1).repeat(3, axis=2)
-    mi.Bitmap(linear.astype(np.float32)).write(str(folder / "linear.exr"))
+    write_exr(folder / "linear.exr", torch.from_numpy(linear))
 
 
 TEXTURES = [

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ngi.machine.backend import activate, mi
+from ngi.machine.backend import a_worker_thread, activate, mi
 from ngi.scene import read_scene
 from ngi.scene.variable_scene import VariableScene
 from tests.scene.stage import disagreement, pictures
@@ -68,7 +68,9 @@ def written_pictures(update, make_scene):
     if update.files is not None:
         update.files(folder)
     activate("scalar")
-    return pictures(mi.load_file(str(folder / "scene.xml"), optimize=False), 1000)
+    with a_worker_thread():
+        scene = mi.load_file(str(folder / "scene.xml"), optimize=False)
+    return pictures(scene, 1000)
 
 
 def check_update(update, backend, make_scene) -> None:
