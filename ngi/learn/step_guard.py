@@ -81,7 +81,8 @@ class Attempt:
 
 def gradient_norm(network: nn.Module) -> Tensor:
     """L2 norm of the whole gradient, []; NaN or Inf where a part of it is so."""
-    return _norm([p.grad for p in network.parameters() if p.grad is not None], 2.0)
+    gradients = [p.grad for p in network.parameters() if p.grad is not None and p.grad.numel()]
+    return torch.nn.utils.get_total_norm(gradients) if gradients else torch.zeros(())
 
 
 def largest_moment(optimizer: torch.optim.Optimizer) -> Tensor:
@@ -92,13 +93,8 @@ def largest_moment(optimizer: torch.optim.Optimizer) -> Tensor:
         for name, value in state.items()
         if name != "step" and isinstance(value, Tensor)
     ]
-    return _norm(moments, math.inf)
-
-
-def _norm(tensors: list[Tensor], order: float) -> Tensor:
-    """0 of nothing, such as the weights of a v that has no components."""
-    held = [tensor for tensor in tensors if tensor.numel()]
-    return torch.nn.utils.get_total_norm(held, order) if held else torch.zeros(())
+    held = [moment.flatten() for moment in moments if moment.numel()]
+    return torch.cat(held).abs().max() if held else torch.zeros(())
 
 
 class StepGuard:

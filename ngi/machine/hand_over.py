@@ -29,6 +29,15 @@ LEGACY = 0
 """PyTorch's handle of CUDA's legacy default stream."""
 
 
+def tensor_of(array: Any) -> Tensor:
+    """The memory of an evaluated array of Dr.Jit's, as PyTorch sees it.
+
+    Asked for it by PyTorch, Dr.Jit 1.5 raises an exception first, for it knows no versions.
+    """
+    tensor: Tensor = from_dlpack(array.__dlpack__())
+    return tensor
+
+
 def stacked(arrays: Sequence[Any]) -> Tensor:
     """C arrays of n numbers, being computed or not any more, to a copy [n, C] where they are.
 
@@ -36,7 +45,7 @@ def stacked(arrays: Sequence[Any]) -> Tensor:
     Raises RuntimeError, as `overwrite` does, where PyTorch is in another stream.
     """
     _check_stream(arrays[0])
-    return torch.stack([from_dlpack(array) for array in arrays], dim=-1)
+    return torch.stack([tensor_of(array) for array in arrays], dim=-1)
 
 
 def overwrite(array: Any, numbers: NDArray[np.float64]) -> None:
@@ -45,7 +54,7 @@ def overwrite(array: Any, numbers: NDArray[np.float64]) -> None:
     Kernels that Dr.Jit has queued read what was there before, later ones what is there then.
     """
     _check_stream(array)
-    memory = from_dlpack(array)
+    memory = tensor_of(array)
     source = torch.from_numpy(numbers).to(memory.dtype)
     if memory.is_cuda:  # else the host would wait until it is copied
         source = source.pin_memory()

@@ -30,7 +30,7 @@ def add_known_light(
     }
     if linear_emission and "emission" in known:
         rest = output + known["direct"] if "direct" in known else output
-        return torch.logaddexp(known["emission"].expm1().log(), rest)  # rest, where nothing emits
+        return torch.logaddexp(_logarithm(known["emission"].contiguous().expm1()), rest)
     if len(known) == 2:  # they add up as radiance, not as its logarithm
         output = output + torch.log1p(known["direct"].expm1() + known["emission"].expm1())
     elif known:
@@ -38,3 +38,9 @@ def add_known_light(
     if "emission" not in known:
         return output
     return torch.where(known["emission"] > EMITTER_THRESHOLD, known["emission"], output)
+
+
+def _logarithm(radiance: Tensor) -> Tensor:
+    """Minus infinity where nothing emits, of which a processor takes four times as long to tell."""
+    dark = radiance == 0
+    return radiance.masked_fill(dark, 1).log().masked_fill(dark, -torch.inf)

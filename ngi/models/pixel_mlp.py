@@ -131,11 +131,10 @@ class _Layers(torch.autograd.Function):
             of_weights.append(_of_weight(g, inputs[number], weight, patches, ctx.watcher))
             if number == ctx.skip and ctx.needs_input_grad[1]:
                 of_pixels = g @ weights[number][:, hidden:]
-            g = torch.ops.aten.leaky_relu_backward(
-                g @ weights[number][:, :hidden],
-                inputs[number][:, :hidden],  # what came out of the activation
-                NEGATIVE_SLOPE,
-                True,
+            g = g @ weights[number][:, :hidden]
+            activated = inputs[number][:, :hidden]  # what came out of the activation
+            torch.ops.aten.leaky_relu_backward.grad_input(
+                g, activated, NEGATIVE_SLOPE, True, grad_input=g
             )
         of_first = _of_weight(g, inputs[0], ctx.parameters[0], patches, ctx.watcher)
         of_weights.append(of_first[:, :pixel_features])

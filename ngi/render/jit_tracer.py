@@ -11,6 +11,7 @@ import gc
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from math import prod
 from typing import Any
 
@@ -25,7 +26,9 @@ from ngi.render.caustics import Caustics, photon_points
 from ngi.render.direct_light import emitter_probabilities, light_points
 from ngi.render.first_hit import FirstHit
 from ngi.render.fitting import does_not_fit
+from ngi.render.recorded_scene import RecordedScene
 from ngi.render.tracing import Pending, Pixels, Tracer, Window, subpixel_points
+from ngi.scene.variable_scene import VariableScene
 
 Trace = Callable[..., "list[mi.Float]"]
 
@@ -42,38 +45,37 @@ class JitTracer(Tracer):
     replayed: tracing the Python code takes up to a fifth of a second in a scene of many materials,
     whatever the size.
 
-    changes: a number that is another one whenever the scene differs in more than the camera
     recorded: False where Dr.Jit must not record anything of this scene
     """
 
     def __init__(
         self,
         *,
-        scene: mi.Scene,
+        scene: VariableScene,
         first_hit: FirstHit,
-        changes: Callable[[], int],
         recorded: bool = True,
     ) -> None:
-        self._scene = scene
+        self._scene = scene.scene
+        replayed = partial(_replayed, scene=RecordedScene(scene), recorded=recorded)
         caustics = first_hit.caustics
-        self._light = None if caustics is None else _PhotonLight(scene, caustics, changes, recorded)
+        self._light = None if caustics is None else _PhotonLight(scene, caustics, replayed)
         self._points: dict[int, tuple[mi.Point2f, list[mi.Float]]] = {}
         # Plain functions, not methods: a frozen function follows the arrays of its arguments only,
         # and holds what is constant for this tracer in its closure.
-        integrator = scene.integrator()
+        scene_now = scene.scene
+        integrator = scene_now.integrator()
         sampler = mi.load_dict({"type": "independent"})
 
         def trace_radiance(
-            scene: mi.Scene, view: _View, seed: mi.UInt32, samples: int, paths: int
+            view: _View, seed: mi.UInt32, samples: int, paths: int
         ) -> list[mi.Float]:
             rng = sampler.fork()
             rng.seed(seed, paths)
-            ray = view.rays(scene, dr.arange(mi.UInt32, paths) // view.samples, rng.next_2d())
-            radiance, _, _ = integrator.sample(scene, rng, mi.RayDifferential3f(ray))
+            ray = view.rays(scene_now, dr.arange(mi.UInt32, paths) // view.samples, rng.next_2d())
+            radiance, _, _ = integrator.sample(scene_now, rng, mi.RayDifferential3f(ray))
             return _block_sums(list(mi.Color3f(radiance)), samples)
 
         def trace_buffers(
-            scene: mi.Scene,
             view: _View,
             numbers: list[mi.UInt32],
             points: mi.Point2f,
@@ -89,11 +91,11 @@ class JitTracer(Tracer):
                 pixel = dr.gather(mi.UInt32, listed, pixel)
             jitter = dr.gather(mi.Point2f, points, sample)
             light_point = [dr.gather(mi.Float, each, sample) for each in light_points]
-            ray = view.rays(scene, pixel, jitter)
-            return _block_sums(first_hit.channels(scene, ray, light_point, *light), samples)
+            ray = view.rays(scene_now, pixel, jitter)
+            return _block_sums(first_hit.channels(scene_now, ray, light_point, *light), samples)
 
-        self._radiance = _replayed(trace_radiance, recorded=recorded)
-        self._buffers = _replayed(trace_buffers, recorded=recorded)
+        self._radiance = replayed(trace_radiance)
+        self._buffers = replayed(trace_buffers)
         self._trace_radiance = trace_radiance
         self._ready = False
 
@@ -101,7 +103,7 @@ class JitTracer(Tracer):
         self._prepare(window)
         view = _View.of(window, samples)
         paths = window.width * window.height * samples
-        sums = self._radiance(self._scene, view, dr.opaque(mi.UInt32, seed), samples, paths)
+        sums = self._radiance(view, dr.opaque(mi.UInt32, seed), samples, paths)
         return _pending(sums, window.shape, samples)
 
     def buffers(self, pixels: Pixels, *, samples: int) -> Pending:
@@ -117,7 +119,7 @@ class JitTracer(Tracer):
         points = self._points[samples]
         photons = isinstance(pixels, Window) or pixels.caustics
         light = [] if self._light is None else self._light.now(photons=photons)
-        sums = self._buffers(self._scene, view, numbers, *points, light, samples, rays)
+        sums = self._buffers(view, numbers, *points, light, samples, rays)
         return _pending(sums, pixels.shape, samples)
 
     def _prepare(self, window: Window) -> None:
@@ -133,26 +135,26 @@ class JitTracer(Tracer):
         gc.collect()
         pixels = window.width * window.height
         view, seed = _View.of(window, 1), dr.opaque(mi.UInt32, 0)
-        dr.eval(self._trace_radiance(self._scene, view, seed, 1, pixels))
+        dr.eval(self._trace_radiance(view, seed, 1, pixels))
         self._ready = True
 
 
 class _PhotonLight:
     """What photons leave in the scene, traced once while nothing but the camera moves.
 
-    changes, recorded: see `JitTracer`
+    replayed: makes a function that is recorded, `_replayed` of the scene
     """
 
     def __init__(
-        self, scene: mi.Scene, caustics: Caustics, changes: Callable[[], int], recorded: bool
+        self, scene: VariableScene, caustics: Caustics, replayed: Callable[[Trace], Trace]
     ) -> None:
-        def trace_photons(scene: mi.Scene, photons: list[mi.Float]) -> list[mi.Float]:
-            light = caustics.trace(scene, photons)
+        def trace_photons(photons: list[mi.Float]) -> list[mi.Float]:
+            light = caustics.trace(scene.scene, photons)
             dr.eval(light)
             return [light]
 
-        self._scene, self._photons, self._changes = scene, photon_points(), changes
-        self._trace = _replayed(trace_photons, recorded=recorded)
+        self._scene, self._photons = scene, photon_points()
+        self._trace = replayed(trace_photons)
         self._light: list[mi.Float] = []
         self._light_of = -1
         self._dark = [caustics.pictures.dark()]
@@ -161,9 +163,9 @@ class _PhotonLight:
         """As `FirstHit.channels` takes it; dark without photons."""
         if not photons:
             return self._dark
-        if self._light_of != (changes := self._changes()):
-            self._light = self._trace(self._scene, self._photons)
-            self._light_of = changes
+        if self._light_of != self._scene.changes:
+            self._light = self._trace(self._photons)
+            self._light_of = self._scene.changes
         return self._light
 
 
@@ -178,7 +180,7 @@ def _points(samples: int, emitters: NDArray[np.float64]) -> tuple[mi.Point2f, li
     return on_device
 
 
-def _replayed(function: Trace, *, recorded: bool) -> Trace:
+def _replayed(function: Trace, *, scene: RecordedScene, recorded: bool) -> Trace:
     """The function with its kernel launches recorded and replayed, where Dr.Jit can do that.
 
     Dr.Jit 1.5 cannot always, for example where another scene was loaded meanwhile: then Python
@@ -189,19 +191,19 @@ def _replayed(function: Trace, *, recorded: bool) -> Trace:
     # At every call Dr.Jit walks through what a frozen function's closure holds, dataclasses in
     # Python: the materials of living-room were half of it. What `function` holds it does not see.
     # A variable material makes a recording for every combination of the choices.
-    replayed = dr.freeze(lambda *arguments: function(*arguments), warn_after=RECORDINGS)
-    works = True
+    replayed = dr.freeze(lambda _, *arguments: function(*arguments), warn_after=RECORDINGS)
+    given = [scene.parts, scene.whole]  # what is missing in the first is in the second
 
     def trace(*arguments: Any) -> list[mi.Float]:
-        nonlocal works
-        if works:
+        while given:
             try:
-                return list(replayed(*arguments))
+                return list(replayed(given[0](), *arguments))
             except RuntimeError as error:
                 if does_not_fit(error):
                     raise
-                works = False
-                _logger.warning("pictures of this scene take longer: %s", error)
+                del given[0]
+                level = logging.DEBUG if given else logging.WARNING
+                _logger.log(level, "pictures of this scene take longer: %s", error)
         return function(*arguments)
 
     return trace

@@ -27,9 +27,8 @@ def tracer_of(variant: str, scene: VariableScene, first_hit: FirstHit) -> Tracer
             scene.description.document.path,
         )
     tracer = JitTracer(
-        scene=scene.scene,
+        scene=scene,
         first_hit=first_hit,
-        changes=lambda: scene.changes,
         recorded=recorded,
     )
     return FittingTracer(tracer, free=free_memory)

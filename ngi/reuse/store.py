@@ -188,8 +188,7 @@ class PatchStore:
         losses = losses.detach().to(device="cpu", dtype=torch.float64)
         self._non_finite_losses += int((~losses.isfinite()).sum())
         losses = torch.where(losses.isfinite(), losses, 0.0).clamp_min(0)
-        for slot, loss in zip(self._slots_of(ids), losses.tolist(), strict=True):
-            self._losses[slot] = loss
+        self._losses.numpy()[self._slots_of(ids)] = losses.numpy()  # one by one, in this order
 
     def pin(self, ids: Tensor) -> None:
         """Keeps these patches until the next call; -1 (a chain that holds no state) is skipped.

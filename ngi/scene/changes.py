@@ -23,6 +23,8 @@ class Changes:
         self._parameters = parameters
         self._structure = EmbreeScene.of(scene)
         self._to_world: dict[mi.Object, NDArray[np.float64]] = {}
+        self.rebuilds = None if self._structure is None else 0
+        """How often all of it was built; None where every change does so."""
 
     def place(self, node: mi.Object, to_world: NDArray[np.float64]) -> None:
         """Takes note of the to_world [4, 4] that was written to an object."""
@@ -39,6 +41,7 @@ class Changes:
         bitmaps = [node for _, node in written if node.class_name().startswith("BitmapTexture")]
         if self._structure is None or any(shape not in self._structure for shape in moved):
             self._parameters.update()
+            self.rebuilds = None if self.rebuilds is None else self.rebuilds + 1
         else:
             self._tell_all_but_the_scene()
             if moved:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-import torch
 from numpy.typing import DTypeLike, NDArray
 
 from ngi.machine.backend import dr, mi
+from ngi.machine.hand_over import tensor_of
 
 
 def variables_of(node: mi.Object) -> list[mi.UInt64]:
@@ -34,7 +34,7 @@ def evaluate(nodes: Iterable[mi.Object]) -> None:
 
 def address(variable: dr.ArrayBase) -> int:
     """Where an evaluated variable lies in memory."""
-    return int(torch.utils.dlpack.from_dlpack(variable).data_ptr())
+    return tensor_of(variable).data_ptr()
 
 
 _ALIGNMENT = 64

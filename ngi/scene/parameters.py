@@ -185,6 +185,11 @@ class Parameters:
             key: value for key, value in self._parameters.properties.items() if key in self._found
         }
 
+    @property
+    def rebuilds(self) -> int | None:
+        """See `Changes.rebuilds`."""
+        return self._changes.rebuilds
+
     def update(self) -> None:
         """Has the scene take note of what was written."""
         self._changes.tell()

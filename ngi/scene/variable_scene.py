@@ -112,6 +112,17 @@ class VariableScene:
                     bsdfs.append(bsdf)
         return bsdfs
 
+    @cached_property
+    def choices(self) -> list[mi.BSDF]:
+        """What variables give shapes in place of their own."""
+        materials = (v for v in self.description.variables if isinstance(v, Material))
+        return [self._parameters.object(name) for v in materials for name in v.choices]
+
+    @property
+    def rebuilds(self) -> int | None:
+        """How often Mitsuba has built the scene anew; None where every change has it do so."""
+        return self._parameters.rebuilds
+
     def bsdfs_of(self, shape: mi.Shape) -> list[mi.BSDF]:
         """Its own, and those that variables give it at some v."""
         chosen = [

@@ -1,0 +1,66 @@
+"""What recorded kernels are given of a scene is all that they read, and not more than once."""
+
+import logging
+
+import pytest
+import torch
+
+from ngi.machine.backend import llvm_problem
+from ngi.render.mitsuba_renderer import MitsubaRenderer
+from ngi.render.recorded_scene import RecordedScene
+from ngi.scene import read_scene, scenes
+from ngi.scene.jit_variables import variables_of
+
+pytestmark = pytest.mark.skipif(llvm_problem() is not None, reason=str(llvm_problem()))
+
+SCENES = ("mirror", "archviz")
+"""Whose variables move instances, lamps and cameras, and give shapes other materials."""
+
+
+def renderer_of(name: str) -> MitsubaRenderer:
+    return MitsubaRenderer(
+        scene=read_scene(**scenes()[name]),
+        backend="llvm",
+        patch_size=8,
+        samples_per_pixel=2,
+        specular="traced",
+        direct="traced",
+    )
+
+
+def numbers(renderer: MitsubaRenderer) -> torch.Tensor:
+    """Of patches of several v, all channels."""
+    generator = torch.Generator().manual_seed(0)
+    states = torch.rand(4, renderer.dimensions + 2, generator=generator)
+    patches = renderer.render_patches(states, resolution=32, seed=0)
+    return torch.cat([patches.buffers, patches.log_radiance], dim=-1)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_scene_and_what_is_given_of_it_trace_the_same(
+    name: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.DEBUG, logger="ngi.render.jit_tracer")
+    given = numbers(renderer_of(name))
+    assert not caplog.records  # nothing had to be asked for again
+    monkeypatch.setattr(RecordedScene, "parts", RecordedScene.whole)
+    assert torch.equal(given, numbers(renderer_of(name)))
+
+
+def test_what_is_missing_is_looked_for_in_the_whole_scene(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    expected = numbers(renderer_of("mirror"))
+    monkeypatch.setattr(RecordedScene, "parts", lambda _: [])
+    caplog.set_level(logging.DEBUG, logger="ngi.render.jit_tracer")
+    assert torch.equal(numbers(renderer_of("mirror")), expected)
+    assert {record.levelname for record in caplog.records} == {"DEBUG"}
+
+
+def test_what_shapes_hold_is_not_the_scene_s_own() -> None:
+    scene = renderer_of("archviz")._scene
+    own, _, shapes, *_ = RecordedScene(scene).parts()
+    of_shapes = {variable.index for shape in shapes for variable in variables_of(shape)}
+    assert own
+    assert len({variable.index for variable in own}) == len(own)
+    assert of_shapes.isdisjoint(variable.index for variable in own)
