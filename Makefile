@@ -7,6 +7,7 @@ SWEEPS := same_time preconditioning resolution target_function acceptance histog
 	ours_same_time ours_preconditioning ours_resolution ours_target_function ours_acceptance ours_histogram ours_dimensions \
 	ours_specular ours_chess ours_cnsr ours_anf
 BUDGET ?= small
+CLOCK ?= model
 OPTIONS ?=
 SCENE ?= living-room
 .PHONY: help setup demo view test report docs lint smoke browser wheel benchmark gpu doctor clean
@@ -45,13 +46,14 @@ smoke: setup
 browser:
 	@sh tools/browser.sh
 
-report: setup ## all sweeps at BUDGET=smoke|small|paper: runs what is missing, builds the report
+report: setup ## all sweeps at BUDGET=smoke|small|paper, CLOCK=model|wall: what is missing; then the report
 	@failed=0; for sweep in $(SWEEPS); do \
-	$(BIN)/ngi costs -m +sweeps=$$sweep budget=$(BUDGET) hydra/launcher=basic \
-	$(filter-out hydra/launcher=% hydra.launcher.%,$(OPTIONS)) && \
-	$(BIN)/python -m ngi.train -m +sweeps=$$sweep budget=$(BUDGET) budget.clock=model $(OPTIONS) \
+	{ [ $(CLOCK) = wall ] || $(BIN)/ngi costs -m +sweeps=$$sweep budget=$(BUDGET) \
+	hydra/launcher=basic $(filter-out hydra/launcher=% hydra.launcher.%,$(OPTIONS)); } && \
+	$(BIN)/python -m ngi.train -m +sweeps=$$sweep budget=$(BUDGET) budget.clock=$(CLOCK) $(OPTIONS) \
 	|| failed=1; done; \
-	$(BIN)/python -m analysis.report outputs/$(BUDGET)-model-clock && exit $$failed
+	$(BIN)/python -m analysis.report \
+	outputs/$(BUDGET)$(if $(filter model,$(CLOCK)),-model-clock) && exit $$failed
 
 docs: setup ## the documentation as a site in build/site, with warnings as errors
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from itertools import groupby
 
 from analysis.tables import Cell, Table
@@ -31,7 +32,9 @@ def to_latex(table: Table) -> str:
     a rule separates the scenes.
     """
     alignment = "l" * table.labels + "r" * (len(table.columns) - table.labels)
-    lines = [r"\begin{table}", rf"\caption{{{escape(table.title)}}}", r"\centering"]
+    label = re.sub(r"[^a-z0-9]+", "-", table.title.lower()).strip("-")
+    caption = rf"\caption{{{escape(table.title)}}}\label{{tab:{label}}}"
+    lines = [r"\begin{table}", caption, r"\centering"]
     lines += [rf"\begin{{tabular}}{{{alignment}}}", r"\toprule", *_heading(table.columns)]
     for _, rows in groupby(table.rows, key=lambda row: row[0].text):
         lines.append(r"\midrule")

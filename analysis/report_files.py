@@ -116,7 +116,8 @@ def _write_tables(
     filled = [table for table in tables if table.rows]
     lines = "\n".join(f"- {note}" for note in notes)
     markdown.write_text("\n\n".join([*map(to_markdown, filled), lines]) + "\n")
-    latex.write_text("\n\n".join(map(to_latex, filled)) + "\n")
+    package = r"% for documents with \usepackage{booktabs}"
+    latex.write_text("\n\n".join([package, *map(to_latex, filled)]) + "\n")
     return [csv, markdown, latex, provenance]
 
 

@@ -31,8 +31,11 @@ from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from ngi.config.unread_output import readers_may_leave
+from ngi.files.resources import config_groups, scene_places
 
 MULTIRUN = ("-m", "--multirun")
+SHOWING = ("-c", "--cfg", "-i", "--info", "-h", "--help", "--hydra-help")
+"""Options with which nothing runs."""
 
 BEST_METHOD = {"machine": "ours", "hour": "ours_small_patches", "scarce": "ours_small_patches"}
 """Of each budget for ours: what had the least error there, scene by scene, of what was tried
@@ -64,9 +67,13 @@ def completed(words: Sequence[str]) -> list[str]:
 def in_order(words: Sequence[str]) -> list[str]:
     """The words with -m before all others; argparse refuses overrides on both sides of an option.
 
-    Raises SystemExit, with a message, for an option that Hydra does not have.
+    Raises SystemExit, with a message, for an option that Hydra does not have, and for a sweep of
+    which a single run is asked for.
     """
     multirun = [word for word in words if word in MULTIRUN]
+    sweep = next((word for word in words if word.startswith("+sweeps=")), None)
+    if sweep and not multirun and not any(word.partition("=")[0] in SHOWING for word in words):
+        sys.exit(f"{sweep}: a sweep is several runs, give -m; with --dry-run they are only listed")
     ordered = [*multirun[:1], *(word for word in words if word not in MULTIRUN)]
     unknown = get_args_parser().parse_known_args(ordered)[1]
     if unknown and unknown[0].startswith("-"):
@@ -95,6 +102,12 @@ log = logging.getLogger(__name__)
 TOLD = (ValueError, OSError, RuntimeError, FloatingPointError, TypeError, ImportError)
 MESSAGES = (*TOLD, InstantiationException)
 """Exceptions whose text says to users what is wrong; all others are bugs."""
+
+WITH_LESS_MEMORY = (
+    "the graphics card has no room for this: free it (`nvidia-smi` says what holds it), or lower "
+    "sampler.chains, model.hidden_features or renderer.workers; the same command goes on from the "
+    "last checkpoint"
+)
 
 FULL_ERROR = "HYDRA_FULL_ERROR"
 """The environment variable that makes Hydra raise errors, which it would print otherwise."""
@@ -151,6 +164,8 @@ def fail(error: Exception, *, job: str) -> NoReturn:
 def in_plain_words(error: Exception) -> str:
     """Without the class that could not be made, with the part of the configuration it is for."""
     cause = error.__cause__
+    if type(error).__name__ == "OutOfMemoryError":  # of PyTorch, which need not be imported
+        return f"{error}\n{WITH_LESS_MEMORY}"
     if not (isinstance(error, InstantiationException) and isinstance(cause, TOLD)):
         return str(error)
     key = str(error).rpartition("full_key: ")[2]
@@ -167,7 +182,7 @@ def explained(error: Exception) -> str:
         group, _, option = str(error.missing_cfg_file).rpartition("/")
         near = get_close_matches(option, error.options, n=1)
         group = "scene" if group.startswith("scene/") else group  # a path, not a name
-        where = "; scenes are folders in ./scenes and $NGI_SCENES" * (group == "scene")
+        where = _about_scenes(option) if group == "scene" else ""
         return (
             f"{error.missing_cfg_file}: there is no such option; "
             f"{group} can be {', '.join(error.options)}{where}{_question(near)}"
@@ -176,12 +191,22 @@ def explained(error: Exception) -> str:
         return _about_key(cause)
     if isinstance(error, OverrideParseException):
         return _about_word(error)
+    if added := re.search(r"To append to your default list use (\+(\w+)=\S+)", str(error)):
+        multirun = ", with -m" * (added[2] == "sweeps")
+        return f"{added[2]}: give it with a plus{multirun}: {added[1]}"
     if isinstance(error, ConfigCompositionException) and str(error).startswith("Ambiguous"):
         return str(error).replace("add --multirun to your command line", "give -m")
     if missing := re.search(r"Missing mandatory value: (\S+)", str(error)):
         return f"{missing[1]}: it has to be given, {missing[1]}=…"
     told = isinstance(cause, OmegaConfBaseException)
     return f"{error}\n{cause}" if told else str(error)
+
+
+def _about_scenes(name: str) -> str:
+    for folder in (place / name for place in scene_places()):
+        if (folder / "scene.xml").is_file():
+            return f"; {folder} has no scene.yaml, `ngi describe {folder / 'scene.xml'}` writes one"
+    return "; scenes are folders in ./scenes and $NGI_SCENES"
 
 
 def _about_word(error: OverrideParseException) -> str:
@@ -196,6 +221,7 @@ def _about_key(error: OmegaConfBaseException) -> str:
     key, full_key, parent = str(error.key), str(error.full_key), error.parent_node
     above = full_key.removesuffix(key)
     known = list(_keys(OmegaConf.to_container(parent))) if isinstance(parent, DictConfig) else []
+    known += () if above else sorted(config_groups() - set(known))
     near = get_close_matches(key, known, n=1) or [k for k in known if k.endswith(f".{key}")]
     swept = f"; where all options of a sweep have it: ++{full_key}=…" * _sweeps()
     if near:

@@ -23,7 +23,7 @@ from hydra.experimental.callback import Callback
 from omegaconf import DictConfig
 from omegaconf.errors import OmegaConfBaseException
 
-from ngi.config.hydra_program import in_plain_words
+from ngi.config.hydra_program import explained, in_plain_words
 from ngi.config.sweep_plan import (
     Planned,
     counted,
@@ -138,7 +138,7 @@ def _show_and_exit(plan: Callable[[], Sequence[Planned]]) -> NoReturn:
         with readers_may_leave():
             print(table(runs))
     except NOT_COMPOSED as error:
-        sys.exit(str(error))
+        sys.exit(explained(error))
     except Exception:
         traceback.print_exc()
         sys.exit("--dry-run: this is a bug; nothing was trained")

@@ -20,6 +20,7 @@ from omegaconf.errors import OmegaConfBaseException
 from tabulate import tabulate
 from tqdm import tqdm
 
+from ngi.clock.costs import REMEDY
 from ngi.clock.counters import Counters
 from ngi.config.build import plain, run_components, without_seed
 from ngi.config.configuration import run_settings, scene_place
@@ -111,6 +112,8 @@ def planned_run(config: DictConfig, costs: dict[str, float | None]) -> Planned:
             _read(json.dumps(plain(config.scene.reader)))
         budget: Budget = instantiate(config.budget)
         state = _state(config, folder)
+        if state != "finished" and "path_tracing" not in config:
+            _check_measured(budget)
         done = _done(folder, budget) if state in ("interrupted", "longer") else 0.0
         left = 0.0 if "path_tracing" in config else _left(config, budget, done, costs)
     except (*MESSAGES, HydraException, OmegaConfBaseException) as error:
@@ -122,6 +125,12 @@ def planned_run(config: DictConfig, costs: dict[str, float | None]) -> Planned:
     settings = {**run_settings(config, scene_hash="", costs=None), "budget": None}
     settings["scene"] |= {"place": scene_place(config)}
     return Planned(folder, state, done, left, settings=json.dumps(settings))
+
+
+def _check_measured(budget: Budget) -> None:
+    """ValueError where the model clock has nothing at all to count with."""
+    if budget.clock == "model" and not Path(str(budget.costs)).exists():
+        raise ValueError(f"budget.costs: {budget.costs} is not there; {REMEDY}")
 
 
 @cache

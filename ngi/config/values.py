@@ -11,7 +11,7 @@ from typing import Any, Union, Unpack, get_args, get_origin, get_type_hints
 
 from omegaconf import DictConfig, OmegaConf
 
-from ngi.files.resources import root
+from ngi.files.resources import config_groups, root
 
 LARGEST_INTEGER = 2**31 - 1
 """What fits everywhere: into tensors' sizes, Mitsuba's parameters, random seeds."""
@@ -82,8 +82,7 @@ def _known_keys() -> dict[str, set[str]]:
     """
     conf = root() / "conf"
     base = OmegaConf.load(conf / "train.yaml")
-    groups = {folder.name for folder in conf.iterdir() if folder.is_dir()}
-    known = {"": {*map(str, base), *groups, *_OF_STUDIES}, "run": set(map(str, base.run))}
+    known = {"": {*map(str, base), *config_groups(), *_OF_STUDIES}, "run": set(map(str, base.run))}
     for group in OWN_OPTIONS:
         options = [OmegaConf.load(file) for file in (conf / group).glob("*.yaml")]
         known[group] = {str(key) for option in options for key in option}

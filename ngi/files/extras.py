@@ -2,6 +2,8 @@
 
 import re
 from importlib.metadata import requires
+from pathlib import Path
+from shlex import quote
 
 from ngi.files.resources import root
 
@@ -19,7 +21,9 @@ EXTRAS = {
 def install_command(extra: str) -> str:
     """The command that installs an extra, of a checkout or beside an installed wheel."""
     if (root() / "pyproject.toml").exists():
-        return f"pip install -e .[{extra}]"
+        here = Path() if root() == Path.cwd() else root()
+        project = quote(f"{here}[{extra}]")
+        return f"pip install -c {quote(str(here / 'constraints.txt'))} -e {project}"
     return f"pip install {' '.join(requirements(extra))}"
 
 

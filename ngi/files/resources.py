@@ -15,17 +15,25 @@ def root() -> Path:
     return repository if (repository / "conf" / "train.yaml").exists() else _PACKAGE / "_data"
 
 
+def config_groups() -> set[str]:
+    """Names of what can be chosen, `name=option`: the folders of conf/."""
+    return {folder.name for folder in (root() / "conf").iterdir() if folder.is_dir()}
+
+
+def scene_places() -> list[Path]:
+    """Folders of scene folders: of the shipped scenes, ./scenes, and those in $NGI_SCENES."""
+    named = os.environ.get("NGI_SCENES", "").split(os.pathsep)
+    return [root() / "scenes", Path.cwd() / "scenes", *(Path(place) for place in named if place)]
+
+
 def scene_folders() -> dict[str, Path]:
-    """Every scene folder by name: shipped ones, ./scenes, and those in $NGI_SCENES.
+    """Every scene folder of `scene_places` by name.
 
     A scene folder holds a scene.yaml; of two with one name, the later of these places wins.
     """
-    places = [root() / "scenes", Path.cwd() / "scenes"]
-    if "NGI_SCENES" in os.environ:
-        places += [Path(part) for part in os.environ["NGI_SCENES"].split(os.pathsep) if part]
     return {
         file.parent.name: file.parent.resolve()
-        for place in places
+        for place in scene_places()
         for file in sorted(place.glob("*/scene.yaml"))
     }
 

@@ -84,6 +84,8 @@ def test_an_option_may_stand_among_overrides() -> None:
         (["a=b", "--budget", "small"], "--budget: there is no such option; .* as budget=…"),
         (["--seed=1"], "--seed=1: there is no such option; .* without dashes, as seed=1 "),
         (["a=b", "--cfg", "job", "c=d"], "^c=d: options have to come before"),
+        (["+sweeps=demo", "a=b"], "^.sweeps=demo: a sweep is several runs, give -m"),
+        (["--dry-run", "+sweeps=demo"], "^.sweeps=demo: a sweep is several runs, give -m"),
     ],
 )
 def test_what_is_no_option_is_answered_by_what_it_may_be(words: list[str], message: str) -> None:

@@ -5,11 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+import torch
 from hydra.errors import HydraException
 from omegaconf.errors import OmegaConfBaseException
 
 from ngi.config.configuration import composed
-from ngi.config.hydra_program import explained, run_program
+from ngi.config.hydra_program import explained, in_plain_words, run_program
 from tests.learn.command_line import SMALL, run, run_module
 
 
@@ -25,6 +26,9 @@ from tests.learn.command_line import SMALL, run, run_module
             "hidden_features=3",
             "hidden_features: there is no such key; did you mean 'model.hidden_features'?",
         ),
+        ("methd=ours", "methd: there is no such key; did you mean 'method'?"),
+        ("experimnt=demo", "experimnt: there is no such key; did you mean 'experiment'?"),
+        ("sweeps=demo", "sweeps: give it with a plus, with -m: +sweeps=demo"),
         ("lr=3", "lr: there is no such key; did you mean 'optimizer.lr'?"),
         ("smapler=uniform", "smapler: there is no such key; did you mean 'sampler'?"),
         (
@@ -52,6 +56,28 @@ def test_of_what_does_not_exist_the_nearest_is_named(word: str, message: str) ->
     with pytest.raises(HydraException) as raised:
         composed("renderer=analytic", word)
     assert message in explained(raised.value)
+
+
+@pytest.mark.parametrize("place", [".", "elsewhere"])
+def test_of_a_scene_without_a_description_what_writes_one_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("NGI_SCENES", str(tmp_path / "elsewhere"))
+    folder = tmp_path / (place if place != "." else "scenes") / "attic"
+    folder.mkdir(parents=True)
+    (folder / "scene.xml").touch()
+    with pytest.raises(HydraException) as raised:
+        composed("renderer=analytic", "scene=attic")
+    expected = f"; {folder} has no scene.yaml, `ngi describe {folder}/scene.xml` writes one"
+    assert expected in explained(raised.value)
+
+
+def test_a_full_graphics_card_is_told_what_takes_its_memory() -> None:
+    said = in_plain_words(torch.OutOfMemoryError("CUDA out of memory"))
+    assert said.startswith("CUDA out of memory\nthe graphics card has no room")
+    assert "sampler.chains" in said
+    assert in_plain_words(RuntimeError("CUDA")) == "CUDA"
 
 
 def test_what_has_to_be_given_is_asked_for() -> None:

@@ -176,7 +176,7 @@ def test_a_key_that_all_options_of_a_sweep_have_is_given_with_two_plus_signs(
     assert "model.octaves: there is no such key; there are " in output
     assert "++model.octaves=…" in output
     status, output = sweep(tmp_path, *words, "++model.octaves=3", options=("-m", "--dry-run"))
-    assert "no such key" not in output
+    assert "model.octaves: there is no such key" not in output
 
 
 def test_seconds_are_known_and_one_run_alone_has_a_dry_run_too(tmp_path: Path) -> None:
@@ -223,6 +223,30 @@ def test_without_a_file_of_costs_nobody_knows_how_long_steps_take(tmp_path: Path
     status, output = run(tmp_path, *words, options=("--dry-run",), base=SIZE)
     assert status == 0, output
     assert "1 run: 1 new; how long they take is not known" in output
+
+
+def test_a_clock_without_costs_is_said_before_anything_runs(tmp_path: Path) -> None:
+    words = ("budget=seconds", "budget.clock=model", "budget.costs=none.json", PLACE)
+    status, output = run(tmp_path, *words, options=("--dry-run",), base=SIZE)
+    assert status == 1, output
+    assert "cannot start: budget.costs: none.json is not there; measure it by" in output
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("-m", "scene=mirror,miror"), "NGI_SCENES; did you mean 'mirror'?"),
+        (("scene=release",), "scene.path: it has to be given"),
+    ],
+)
+def test_what_a_dry_run_cannot_compose_is_said_as_a_run_says_it(
+    tmp_path: Path, words: tuple[str, ...], message: str
+) -> None:
+    status, output = run_module("ngi.train", *words, "--dry-run", folder=tmp_path)
+    assert status == 1
+    assert message in output
+    assert "provider" not in output
+    assert "full_key" not in output
 
 
 BROKEN = """

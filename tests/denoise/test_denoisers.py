@@ -86,7 +86,7 @@ def test_small_patches_lose_little_for_being_small(oidn: OpenImageDenoise) -> No
 
 def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pyoidn", None)
-    with pytest.raises(RuntimeError, match=r"pip install -e \.\[denoise\]"):
+    with pytest.raises(RuntimeError, match=r"pip install .* -e .*\[denoise\]"):
         OpenImageDenoise()
 
 

@@ -1,3 +1,4 @@
+import shlex
 import tomllib
 from pathlib import Path
 
@@ -20,7 +21,12 @@ def test_the_packages_of_an_extra_are_those_that_are_declared(extra: str) -> Non
 def test_a_checkout_installs_itself_and_a_wheel_the_packages(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    assert install_command("viewer") == "pip install -e .[viewer]"
+    checkout = extras.root()
+    monkeypatch.chdir(checkout)
+    assert install_command("viewer") == "pip install -c constraints.txt -e '.[viewer]'"
+    monkeypatch.chdir(tmp_path)
+    told = shlex.split(install_command("viewer"))
+    assert told == f"pip install -c {checkout}/constraints.txt -e {checkout}[viewer]".split()
     monkeypatch.setattr(extras, "root", lambda: tmp_path)
     assert install_command("viewer") == f"pip install {DECLARED['viewer'][0]}"
     assert install_command("export") == f"pip install {' '.join(sorted(DECLARED['export']))}"

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import torch
 
+from ngi.files.extras import install_command
 from ngi.files.resources import root
 from ngi.learn.supersampling import LEAST
 from ngi.machine.precision import multiplies_bfloat16
@@ -319,4 +320,4 @@ def test_a_missing_extra_is_named(
     monkeypatch.chdir(trained)
     monkeypatch.setattr(export, "PACKAGES", ("onnx", "no_such_package"))
     assert export.main(["run=run"]) == 2
-    assert "no_such_package missing: pip install -e .[export]" in capsys.readouterr().err
+    assert f"no_such_package missing: {install_command('export')}" in capsys.readouterr().err

@@ -11,6 +11,7 @@ import torch
 from numpy.typing import NDArray
 from PIL import Image
 
+from ngi.files.extras import install_command
 from ngi.view import film
 from ngi.view.video import main
 from tests.learn.command_line import run, run_module
@@ -287,7 +288,7 @@ def test_a_missing_extra_is_named_before_anything_is_done(
 ) -> None:
     monkeypatch.setitem(sys.modules, "av", None)
     assert video(tmp_path, monkeypatch) == 2
-    assert "pip install -e .[video]" in capsys.readouterr().err
+    assert install_command("video") in capsys.readouterr().err
 
 
 def test_interrupted_work_leaves_no_file(trained: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,6 +7,7 @@ from typing import Any, NoReturn
 
 import pytest
 
+from ngi.files.extras import install_command
 from ngi.render import AnalyticRenderer
 from ngi.view.__main__ import main
 from ngi.view.subject import Subject
@@ -38,7 +39,7 @@ def test_what_has_to_be_installed_is_named(
     monkeypatch.delitem(sys.modules, "ngi.view.page", raising=False)
     monkeypatch.setitem(sys.modules, "viser", None)
     assert main(["run=any"]) == 2
-    assert "ngi view needs viser: pip install -e .[viewer]" in capsys.readouterr().err
+    assert f"ngi view needs viser: {install_command('viewer')}" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("supersampled", [True, False])
