@@ -83,20 +83,23 @@ def methods_in_order(runs: Sequence[Run]) -> list[str]:
     return sorted({run.method for run in runs}, key=position)
 
 
-def is_baseline(method: str) -> bool:
-    return method.split(", ")[0] == BASELINE
+def is_baseline(method: str, *, baseline: str = BASELINE) -> bool:
+    """baseline: a method's name, or what all names of its variants begin with"""
+    return baseline in (method, method.split(", ")[0])
 
 
-def baselines(budgets: Mapping[str, object]) -> list[tuple[str, str]]:
-    """Every other method beside its baseline: uniform sampling where that was run, else the first.
+def baselines(budgets: Mapping[str, object], *, baseline: str = BASELINE) -> list[tuple[str, str]]:
+    """Every other method beside its baseline: the one that is asked for where that was run, else
+    the first.
 
     budgets: by method, in order; each method has the baseline of its own budget, where there is one
     """
-    uniform, found = [method for method in budgets if is_baseline(method)], []
+    asked_for = [method for method in budgets if is_baseline(method, baseline=baseline)]
+    found = []
     for method, budget in budgets.items():
         alike = [other for other in budgets if budgets[other] == budget]
-        own = [other for other in alike if is_baseline(other)]
-        found.append((method, (own or uniform or alike)[0]))
+        own = [other for other in alike if other in asked_for]
+        found.append((method, (own or asked_for or alike)[0]))
     return [(method, baseline) for method, baseline in found if method != baseline]
 
 

@@ -29,6 +29,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         "--output", metavar="PATH", type=Path, help="where to write; by default FOLDER/report"
     )
     parser.add_argument(
+        "--baseline",
+        metavar="METHOD",
+        help="what all others are compared with, for example ours; by default uniform sampling "
+        "where that was run; the claims have their own",
+    )
+    parser.add_argument(
         "--wandb",
         metavar="PROJECT",
         help="log the tables at Weights & Biases; see docs/guide/wandb",
@@ -36,7 +42,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = parser.parse_args(argv)
     from analysis.report_files import write_report
 
-    report = write_report(arguments.folder, arguments.output or arguments.folder / "report")
+    output = arguments.output or arguments.folder / "report"
+    report = write_report(arguments.folder, output, baseline=arguments.baseline)
     print(report.text)
     for warning in report.warnings:
         print(f"warning: {warning}", file=sys.stderr)

@@ -18,7 +18,14 @@ from analysis.exploration_plots import write_exploration_figures
 from analysis.films import film_tables
 from analysis.frame_times import frame_table
 from analysis.latex import to_latex
-from analysis.methods import differing_fields, methods_in_order, name_methods, title
+from analysis.methods import (
+    BASELINE,
+    differing_fields,
+    is_baseline,
+    methods_in_order,
+    name_methods,
+    title,
+)
 from analysis.page import PageContents, write_page
 from analysis.pairs import ways_left_out
 from analysis.pictures import write_comparisons
@@ -47,18 +54,24 @@ class Report:
     warnings: list[str]
 
 
-def write_report(folder: Path, output: Path) -> Report:
+def write_report(folder: Path, output: Path, *, baseline: str | None = None) -> Report:
     """Reads every run below `folder` and writes the page, tables, plots, pictures into `output`.
 
-    Raises ValueError where there is no run or the runs cannot be compared; nothing is written
-    then.
+    baseline: the method that others are compared with, beside the claims; `BASELINE` where None
+    Raises ValueError where there is no run, where the runs cannot be compared and where there is
+    none of the baseline; nothing is written then.
     """
     runs, warnings = find_runs(folder)
     runs = name_methods(runs)
     check_comparable(runs)
+    if baseline is None:
+        baseline = BASELINE
+    elif not any(is_baseline(run.method, baseline=baseline) for run in runs):
+        there = ", ".join(f"'{method}'" for method in methods_in_order(runs))
+        raise ValueError(f"--baseline {baseline}: there is no such run; there are {there}")
     doubts = comparison_warnings(runs) + ways_left_out(runs)
     summaries, styles = summarise(runs), method_styles(runs)
-    comparisons, claims = compare(summaries), judge(runs)
+    comparisons, claims = compare(summaries, baseline=baseline), judge(runs)
     notes = _notes(runs, claims)
     films, unreadable = film_tables(folder, runs)
     found, frames = claims_table(claims), frame_table(runs)
@@ -90,6 +103,7 @@ def write_report(folder: Path, output: Path) -> Report:
         exploration_table=exploration_table(runs),
         exploration_files=exploration,
         films=films,
+        baseline=baseline,
     )
     page = output / "index.html"
     write_page(contents, page, lambda parts: _progress(parts, "page"))

@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.methods import baselines, methods_in_order
+from analysis.methods import BASELINE, baselines, methods_in_order
 from analysis.runs import DISTINCTIONS, METRICS, SETS, Run
 from analysis.statistics import Estimate, estimate, paired_difference
 
@@ -100,8 +100,8 @@ class Comparison:
     differences: dict[str, Estimate | None]
 
 
-def compare(summaries: Sequence[Summary]) -> list[Comparison]:
-    """Every method of a scene against its baseline: the first uniform sampling, else the first.
+def compare(summaries: Sequence[Summary], *, baseline: str = BASELINE) -> list[Comparison]:
+    """Every method of a scene against its baseline: the first of this name, else the first.
 
     Where that was run with several budgets, each method has the one of its own.
     """
@@ -111,7 +111,8 @@ def compare(summaries: Sequence[Summary]) -> list[Comparison]:
         budgets = {summary.method: summary.runs[0].label.get("budget") for summary in methods}
         named = {summary.method: summary for summary in methods}
         compared = (
-            _compare(named[baseline], named[other]) for other, baseline in baselines(budgets)
+            _compare(named[first], named[other])
+            for other, first in baselines(budgets, baseline=baseline)
         )
         comparisons += [found for found in compared if any(found.differences.values())]
     return comparisons

@@ -14,7 +14,7 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig
 
 from ngi.config.build import build_recorder, build_run, plain, run_costs, training_device
-from ngi.config.configuration import register, run_settings, scene_place
+from ngi.config.configuration import register, run_settings, scene_record
 from ngi.config.hydra_program import MESSAGES, completed, fail, run_program, with_overrides
 from ngi.config.outline import only_bootstrap, outline
 from ngi.config.values import check_values
@@ -149,7 +149,7 @@ def _begin(config: DictConfig, folder: learn.RunFolder) -> None:
     """Writes down where the scene lies, and which code the steps from here on are made with."""
     from ngi.files.code_versions import record_code_version
 
-    folder.begin(scene_place=scene_place(config))
+    folder.begin(scene=scene_record(config))
     record_code_version(folder.path, after_step=folder.steps.last_step)
 
 

@@ -59,6 +59,7 @@ class PageContents:
     name: of the folder that is reported; claims: all of them, those without runs too;
     exploration: what the chains did, a table and its figures' files; no rows, none without chains
     films: how steady networks are in motion; no tables without films
+    baseline: the method that others are compared with where it was run
     """
 
     name: str
@@ -72,6 +73,7 @@ class PageContents:
     exploration_table: Table
     exploration_files: Sequence[Path]
     films: Sequence[Table]
+    baseline: str
 
 
 def write_page(
@@ -117,7 +119,7 @@ def _context(
         "budgets": _distinct(run.label["budget"] for run in runs),
         "errors": error_table(summaries, ["hard"]),
         "further_errors": _further_errors(contents),
-        "times": time_table(runs),
+        "times": time_table(runs, baseline=contents.baseline),
         "exploration_figures": _exploration_figures(contents.exploration_files),
         "dimensions_figures": _dimensions_figures(runs),
         "costs": [

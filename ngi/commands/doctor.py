@@ -72,13 +72,14 @@ def torch_device() -> Finding:
 
 
 def llvm() -> Finding:
-    from ngi.machine.llvm import INSTALL_COMMAND, find_llvm, llvm_candidates
+    from ngi.machine.llvm import INSTALL_COMMAND, WITHOUT_ROOT, find_llvm, llvm_candidates
 
     chosen = find_llvm()
     if chosen is not None:
         return Finding("libLLVM (fast CPU renderer)", True, str(chosen))
     rejected = "; ".join(f"{c.path}: {c.problem}" for c in llvm_candidates()) or "none found"
-    return Finding("libLLVM (fast CPU renderer)", False, rejected, INSTALL_COMMAND)
+    remedy = f"{INSTALL_COMMAND}, {WITHOUT_ROOT}"
+    return Finding("libLLVM (fast CPU renderer)", False, rejected, remedy)
 
 
 def optix() -> Finding:

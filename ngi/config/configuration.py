@@ -7,11 +7,13 @@ import os
 import re
 from collections.abc import Callable
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import hydra
 from hydra.core.config_store import ConfigStore
 from hydra.core.hydra_config import HydraConfig
+from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
 
 import ngi
@@ -75,10 +77,20 @@ NOT_IDENTITY = (
 """Parts of the configuration that do not decide what a run computes: names, places, helpers."""
 
 
+RENDERED_HASH = "_rendered_hash_"
+"""In scene.json, as Hydra's own keys are written: no argument of what reads the scene."""
+
+
 def scene_folder(path: str) -> str:
     """Name of the folder of a scene, which is given by that or by its XML file."""
     place = Path(path).resolve()
     return (place.parent if place.is_file() else place).name
+
+
+def sweep_names() -> str:
+    """Of all sweeps that come with the program, in lines that help texts have room for."""
+    names = sorted(file.stem for file in (root() / "sweeps").glob("*.yaml"))
+    return fill(", ".join(names), width=96, subsequent_indent="  ")
 
 
 RESOLVERS: dict[str, Callable[..., Any]] = {
@@ -92,6 +104,7 @@ RESOLVERS: dict[str, Callable[..., Any]] = {
     "bootstrap_batches": bootstrap_batches,
     "warmup_steps": warmup_steps,
     "folder_name": scene_folder,
+    "sweep_names": sweep_names,
     "absolute_path": lambda *parts: str(Path(*parts).absolute()),
     "cache_folder": lambda: str(cache_folder()),
 }
@@ -128,6 +141,15 @@ def scene_place(config: DictConfig) -> dict[str, Any] | None:
         if key in place:
             place[key] = str(Path(place[key]).resolve())
     return place
+
+
+def scene_record(config: DictConfig) -> dict[str, Any] | None:
+    """What a run's scene.json says: `scene_place`, and the `SceneDescription.rendered_hash`."""
+    place = scene_place(config)
+    if place is None:
+        return None
+    description = instantiate(config.scene.reader, _convert_="all")
+    return {**place, RENDERED_HASH: description.rendered_hash}
 
 
 def run_settings(config: DictConfig, *, scene_hash: str, costs: Costs | None) -> dict[str, Any]:

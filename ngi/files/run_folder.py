@@ -85,16 +85,16 @@ class RunFolder:
             result: dict[str, Any] = json.loads(self._result.read_text())
         return result
 
-    def begin(self, *, scene_place: dict[str, Any] | None = None) -> None:
+    def begin(self, *, scene: dict[str, Any] | None = None) -> None:
         """Makes the folder this run's, once everything is built and training can start.
 
-        scene_place: where the scene lies, kept in scene.json; no part of the identity
+        scene: where it lies, and as what it is known; kept in scene.json, no part of the identity
         """
         if self.restarted:
             self._forget()
         _write_json(self._settings, self.settings)
-        if scene_place is not None:
-            _write_json(self.path / "scene.json", scene_place)
+        if scene is not None:
+            _write_json(self.path / "scene.json", scene)
 
     def forget_result(self) -> None:
         """Before anything of a finished run is changed that is to be trained longer."""

@@ -16,7 +16,7 @@ from ctypes import CDLL
 from functools import cache
 from threading import RLock
 
-from ngi.machine.llvm import INSTALL_COMMAND, find_llvm, llvm_candidates
+from ngi.machine.llvm import INSTALL_COMMAND, WITHOUT_ROOT, find_llvm, llvm_candidates
 
 LIBCUDA = "libcuda.so.1"
 """The driver's name wherever one is installed; Dr.Jit itself tries libcuda.so, then /usr/lib."""
@@ -132,7 +132,8 @@ def llvm_problem() -> str | None:
     if _llvm is not None:
         return None
     rejected = "; ".join(f"{c.path}: {c.problem}" for c in llvm_candidates())
-    return f"no usable libLLVM ({rejected or 'none found'}); get one with `{INSTALL_COMMAND}`"
+    remedy = f"get one with `{INSTALL_COMMAND}`, {WITHOUT_ROOT}"
+    return f"no usable libLLVM ({rejected or 'none found'}); {remedy}"
 
 
 @cache

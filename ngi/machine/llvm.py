@@ -18,6 +18,8 @@ OLDEST_VERSION = 17
 
 INSTALL_COMMAND = "apt-get install libllvm19"
 
+WITHOUT_ROOT = "or, without being root, from conda-forge: name the file in DRJIT_LIBLLVM_PATH"
+
 LIBRARY_PATTERNS = (
     "/usr/lib/llvm-*/lib/libLLVM",
     "/usr/lib/*/libLLVM",
@@ -72,7 +74,8 @@ def _candidate_paths() -> list[str]:
     paths = []
     if asked_for := os.environ.get("DRJIT_LIBLLVM_PATH"):
         paths.append(asked_for)
-    for pattern in LIBRARY_PATTERNS:
+    conda = os.environ.get("CONDA_PREFIX")
+    for pattern in (*LIBRARY_PATTERNS, *([f"{conda}/lib/libLLVM"] if conda else [])):
         matches = Path("/").glob(pattern.lstrip("/") + "*")
         paths += sorted(str(match) for match in matches if _LIBRARY_NAME.fullmatch(match.name))
     # A bare name such as libLLVM-19.so.1: the dynamic linker knows folders that we do not.

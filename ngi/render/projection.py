@@ -1,5 +1,9 @@
 """Where in the image a point of the scene is."""
 
+from __future__ import annotations
+
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,9 +21,12 @@ def require_told_camera(scene: VariableScene) -> None:
         )
 
 
-def require_perspective(scene: VariableScene) -> None:
-    """Raises ValueError where the camera is no perspective one with a whole square film."""
-    sensor, path = scene.scene.sensors()[0], scene.description.document.path
+def require_perspective(scene: mi.Scene, *, path: Path) -> None:
+    """Raises ValueError where the camera is no perspective one with a whole square film.
+
+    path: of the scene's file
+    """
+    sensor = scene.sensors()[0]
     if sensor.class_name() != "PerspectiveCamera":
         raise ValueError(
             f"{path}: the camera is a {sensor.class_name()}; make it <sensor "

@@ -26,6 +26,8 @@ class SceneDescription:
         which normalises positions (the scene's own box moves with the variables).
     camera_path: key frames of v, each of length D. hard_frames: the test frames, likewise.
     scene_hash: hash of the contents of all files that the scene consists of.
+    rendered_hash: hash of what decides its pixels: without test frames, camera path, number of
+        samples and comments.
     """
 
     name: str
@@ -37,6 +39,7 @@ class SceneDescription:
     camera_path: tuple[Vector, ...]
     hard_frames: tuple[Vector, ...]
     scene_hash: str
+    rendered_hash: str
 
     @property
     def dimensions(self) -> int:

@@ -3,8 +3,10 @@
 Everything that can be wrong in either is found here, before Mitsuba is even imported.
 """
 
+import json
 from dataclasses import replace
 from difflib import get_close_matches
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -70,6 +72,7 @@ def read_scene(folder: Path | str, *, dimensions: int | None = None) -> SceneDes
         camera_path=_frames(top, "camera_path", PATH_FRAMES, complete),
         hard_frames=_frames(top, "hard_frames", HARD_FRAMES, complete),
         scene_hash=content_hash(contents),
+        rendered_hash=_rendered_hash(top.values, content_hash(contents[1:])),
     )
     top.finish()
     if (authored := integrator_max_depth(xml)) != description.max_depth:
@@ -80,6 +83,12 @@ def read_scene(folder: Path | str, *, dimensions: int | None = None) -> SceneDes
     for variant in variants:
         _first(description, variant, path)
     return description if dimensions is None else _first(description, dimensions, path)
+
+
+def _rendered_hash(description: dict[str, Any], files: str) -> str:
+    """files: hash of all but scene.yaml, whose keys and values are the description."""
+    rendered = {key: description[key] for key in ("scene", "max_depth", "bounds", "variables")}
+    return sha256(json.dumps([rendered, files], sort_keys=True).encode()).hexdigest()
 
 
 def scenes() -> dict[str, dict[str, Any]]:

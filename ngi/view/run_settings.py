@@ -10,6 +10,7 @@ from typing import Any
 from hydra.utils import get_object
 from omegaconf import DictConfig, OmegaConf
 
+from ngi.config.configuration import RENDERED_HASH
 from ngi.evaluate import EvaluationProtocol
 from ngi.files.durable import damage_named
 from ngi.files.resources import root
@@ -183,9 +184,16 @@ def make_renderer(
     if description is not None:
         options |= {"backend": "auto", "scene": description, "workers": 0, "cluster": None}
     renderer: Renderer = made_by(settings, "renderer")(**options)
-    if renderer.scene_hash != settings["scene"]["hash"]:
+    changed = renderer.scene_hash != settings["scene"]["hash"]
+    if changed and not (description is not None and _renders_the_same(folder, description)):
         raise ValueError(
             f"{folder} was trained on '{settings['scene']['name']}' as it was then; the scene has "
             "changed since, and a network knows only what it was trained on"
         )
     return renderer
+
+
+def _renders_the_same(folder: Path, description: SceneDescription) -> bool:
+    """Whether nothing has changed that decides the scene's pixels."""
+    place = _remembered_place(folder)
+    return place is not None and place.get(RENDERED_HASH) == description.rendered_hash

@@ -3,14 +3,17 @@
 from pathlib import Path
 
 from ngi.files.durable import write_atomically
+from ngi.machine.backend import mi
 from ngi.render.materials import collect_materials
 from ngi.render.needs import buffer_needs, buffers_are_static, direct_need, needed_layout
+from ngi.render.projection import require_perspective
 from ngi.render.sampling_advice import sampling_advice
 from ngi.scene.arrangement import STATIC
 from ngi.scene.clearance import camera_problems, meeting_views, out_of_bounds
 from ngi.scene.description import SceneDescription
 from ngi.scene.loading import load
 from ngi.scene.scene_files import read_scene_file
+from ngi.scene.scene_parameters import has_surface
 from ngi.scene.starter import candidates, starter_yaml
 from ngi.scene.variable_scene import VariableScene
 
@@ -18,6 +21,7 @@ from ngi.scene.variable_scene import VariableScene
 def describe_scene(description: SceneDescription) -> tuple[str, list[str]]:
     """A text about a variable scene, and what is wrong with it."""
     scene = VariableScene(description)
+    require_perspective(scene.scene, path=description.document.path)
     lines = [
         f"{description.name}: {description.dimensions} dimensions, {description.document.path}",
         f"  {description.samples_per_pixel} samples per pixel, max_depth {description.max_depth}",
@@ -60,6 +64,9 @@ def describe_file(path: Path) -> str:
     lines += [f"  {name}: {', '.join(kinds)}" for name, kinds in properties.items()]
     if nameless:
         lines.append(f"  and {nameless} more object(s) without an id: give them one to vary them")
+    lines += [
+        f"  cannot be trained on as it is: {obstacle}" for obstacle in _obstacles(scene, path)
+    ]
     target = path.parent / "scene.yaml"
     if target.exists():
         lines += ["", f"{target} is there: describe its folder {path.parent}"]
@@ -67,6 +74,24 @@ def describe_file(path: Path) -> str:
         write_atomically(target, starter_yaml(document, scene, found).encode())
         lines += ["", f"wrote {target}; adjust it, then describe its folder {path.parent}"]
     return "\n".join(lines)
+
+
+def _obstacles(scene: mi.Scene, path: Path) -> list[str]:
+    """What a renderer of this file would say is wrong with it."""
+
+    def camera() -> None:
+        require_perspective(scene, path=path)
+
+    def materials() -> None:
+        collect_materials([shape.bsdf() for shape in scene.shapes() if has_surface(shape)])
+
+    found = []
+    for check in (camera, materials):
+        try:
+            check()
+        except ValueError as error:
+            found.append(str(error))
+    return found
 
 
 def _geometry(scene: VariableScene) -> str:

@@ -6,6 +6,7 @@ import pytest
 
 from analysis.latex import escape, to_latex
 from analysis.methods import baselines, name_methods, title
+from analysis.report_files import write_report
 from analysis.runs import METRICS, SETS, find_runs
 from analysis.statistics import Estimate, estimate
 from analysis.summary import Comparison, compare, summarise, to_frame
@@ -94,6 +95,22 @@ def test_a_method_is_compared_with_the_baseline_of_its_own_budget(make_run, tmp_
     assert pairs == expected
     rows = [[cell.text for cell in row[1:3]] for row in time_table(runs).rows]
     assert rows == [[title(other), title(baseline)] for baseline, other in expected]
+
+
+def test_others_are_compared_with_what_is_asked_for(make_run, tmp_path) -> None:
+    for method in ("uniform", "active_exploration", "ours"):
+        make_run(method=method)
+    runs = name_methods(find_runs(tmp_path)[0])
+    found = compare(summarise(runs), baseline="ours")
+    assert {(each.baseline, each.other) for each in found} == {
+        ("ours", "uniform"),
+        ("ours", "active_exploration"),
+    }
+    rows = time_table(runs, baseline="ours").rows
+    assert {row[2].text for row in rows} == {title("ours")}
+    with pytest.raises(ValueError, match=r"--baseline mine: .* there are 'uniform', 'active_expl"):
+        write_report(tmp_path, tmp_path / "report", baseline="mine")
+    assert not (tmp_path / "report").exists()
 
 
 def test_without_uniform_sampling_each_budget_has_a_first_method() -> None:

@@ -7,6 +7,7 @@ import yaml
 from hydra.utils import instantiate
 
 from ngi.config.build import reuse_policy
+from ngi.config.configuration import sweep_names
 from ngi.files.resources import root
 from ngi.learn import PatchSamples, network_of
 from ngi.render import AnalyticRenderer
@@ -35,6 +36,10 @@ def test_every_sweep_says_its_command(sweep: str) -> None:
     text = (root() / "sweeps" / f"{sweep}.yaml").read_text()
     assert f"python -m ngi.train -m +sweeps={sweep}" in text.splitlines()[1]
     assert composed(f"+sweeps={sweep}").hydra.sweeper.params
+
+
+def test_help_names_every_sweep() -> None:
+    assert sweep_names().replace(",", " ").split() == SWEEPS
 
 
 OF_THE_PAPER = [sweep for sweep in SWEEPS if sweep not in OF_ONE_SIZE]

@@ -40,6 +40,17 @@ def test_newest_usable_library_is_found(libraries) -> None:
     assert found.path == str(libraries / "libLLVM-19.so")
 
 
+def test_one_of_conda_is_found(libraries, tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(llvm, "LIBRARY_PATTERNS", ())
+    assert llvm.find_llvm() is None
+    (tmp_path / "lib").mkdir()
+    (libraries / "libLLVM-17.so").rename(tmp_path / "lib" / "libLLVM-17.so")
+    monkeypatch.setenv("CONDA_PREFIX", str(tmp_path))
+    found = llvm.find_llvm()
+    assert found is not None
+    assert found.path == f"{tmp_path}/lib/libLLVM-17.so"
+
+
 @pytest.mark.usefixtures("libraries")
 def test_every_candidate_has_a_verdict() -> None:
     verdicts = {c.path.split("-")[-1]: c for c in llvm.llvm_candidates()}

@@ -315,3 +315,24 @@ def test_errors_are_one_line(room, capsys, edit, message) -> None:
     error = capsys.readouterr().err
     assert message in error
     assert error.count("\n") == 1
+
+
+MASKED = """<bsdf type="mask" id="grey"><float name="opacity" value="0.5"/>
+<bsdf type="diffuse"/></bsdf>"""
+
+
+def test_what_no_renderer_takes_is_said_before_anything_is_trained(room, capsys) -> None:
+    folder = room(PAINT)
+    text = ROOM.replace('<integer name="width" value="8"/>', '<integer name="width" value="16"/>')
+    (folder / "scene.xml").write_text(text)
+    assert main([str(folder)]) == 2
+    assert "the film is 16 x 8; make width and height equal" in capsys.readouterr().err
+    shown = text.replace('<bsdf type="diffuse" id="grey"/>', MASKED)
+    ball = '<float name="radius" value="0.5"/><ref id='
+    shown = shown.replace(f'{ball}"paint"/>', f'{ball}"grey"/>')
+    (folder / "scene.xml").write_text(shown)
+    assert main([str(folder / "scene.xml")]) == 0
+    told = capsys.readouterr().out
+    assert "cannot be trained on as it is" in told
+    assert "the film is 16 x 8" in told
+    assert "MaskBSDF" in told

@@ -1,18 +1,20 @@
 """A run knows where its scene is, wherever it is opened from."""
 
 import json
+import re
 import shutil
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from ngi.config.configuration import scene_place
+from ngi.config.configuration import scene_place, scene_record
 from ngi.files.resources import root
 from ngi.learn import RunFolder
 from ngi.view import trained_run
 from ngi.view.path_traced_run import PathTracedRun, open_run
-from ngi.view.run_settings import RENAMED, describe_scene, made_by
+from ngi.view.run_settings import RENAMED, describe_scene, made_by, make_renderer
 from ngi.view.trained_run import TrainedRun
 from tests.config.command_line import composed
 
@@ -26,10 +28,10 @@ def begun(folder: Path, scene: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A run of a scene below $NGI_SCENES, which is not set when the run is opened."""
     shutil.copytree(root() / "scenes" / "mirror", scene)
     monkeypatch.setenv("NGI_SCENES", str(scene.parent))
-    place = scene_place(composed(f"scene={scene.name}"))
+    place = scene_record(composed(f"scene={scene.name}"))
     monkeypatch.delenv("NGI_SCENES")
     run = RunFolder(folder, settings=SETTINGS)
-    run.begin(scene_place=place)
+    run.begin(scene=place)
     run.close()
     return folder
 
@@ -45,11 +47,42 @@ def test_a_run_finds_its_scene_without_being_told(tmp_path, monkeypatch) -> None
         describe_scene(folder, SETTINGS, None)
 
 
+@pytest.mark.parametrize(
+    ("changed", "opened"),
+    [
+        ("samples_per_pixel: 512 # more\n", True),
+        ("hard_frames: [[0.1, 0.2]]\n", True),
+        ("camera_path: [[0.1, 0.2], [1, 1]]\n# a comment\n", True),
+        ("bounds: {minimum: [-4, 0, -2.2], maximum: [3.4, 2.8, 2.6]}\n", False),
+    ],
+)
+def test_what_changes_no_pixel_leaves_a_network_what_it_was(
+    tmp_path, monkeypatch, changed: str, opened: bool
+) -> None:
+    scene = tmp_path / "elsewhere" / "my-lamp"
+    folder = begun(tmp_path / "run", scene, monkeypatch)
+    before = describe_scene(folder, SETTINGS, None)
+    assert before is not None
+    settings = {**SETTINGS, "scene": {"name": "my-lamp", "hash": before.scene_hash}}
+    key, text = changed.split(":")[0], (scene / "scene.yaml").read_text()
+    entries = re.split(r"^(?=\w)", text, flags=re.MULTILINE)
+    others = [entry for entry in entries if entry.split(":")[0] != key]
+    (scene / "scene.yaml").write_text("".join([*others, changed]))
+    after = describe_scene(folder, settings, None)
+    assert after is not None
+    assert after.scene_hash != before.scene_hash
+    with nullcontext() if opened else pytest.raises(ValueError, match="has changed since"):
+        make_renderer(folder, settings, after)
+    (folder / "scene.json").unlink()  # as a run of before has none, or not all of it
+    with pytest.raises(ValueError, match="has changed since"):
+        make_renderer(folder, settings, after)
+
+
 def test_where_the_scene_is_is_no_part_of_the_identity(tmp_path, monkeypatch) -> None:
     folder = begun(tmp_path / "run", tmp_path / "elsewhere" / "my-lamp", monkeypatch)
     identity = (folder / "settings.json").read_text()
     run = RunFolder(folder, settings=SETTINGS)
-    run.begin(scene_place={"_target_": "ngi.scene.read_scene", "folder": "/moved"})
+    run.begin(scene={"_target_": "ngi.scene.read_scene", "folder": "/moved"})
     run.close()
     assert (folder / "settings.json").read_text() == identity
 

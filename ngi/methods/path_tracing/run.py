@@ -12,7 +12,7 @@ from torch import Tensor
 
 from ngi.clock.phase_clock import PAUSES, PHASES
 from ngi.config.build import build_network, build_samples, plain, training_device
-from ngi.config.configuration import scene_place
+from ngi.config.configuration import scene_record
 from ngi.files.code_versions import record_code_version
 from ngi.machine.precision import dtype_of
 from ngi.machine.provenance import provenance
@@ -50,7 +50,7 @@ def run_path_tracing(
     """
     plan = instantiate(config.path_tracing)
     label = {**plain(config.label), **dict.fromkeys(UNUSED, "none"), "seed": config.seed}
-    folder.begin(scene_place=scene_place(config))
+    folder.begin(scene=scene_record(config))
     folder.forget_logs()
     record_code_version(folder.path, after_step=0)
     tracker.start(folder=folder.path, settings=folder.settings, label=label)

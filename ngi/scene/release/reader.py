@@ -135,6 +135,7 @@ def read_release(path: Path | str) -> SceneDescription:
     variables = _rewrite(source, tags, motions, still)
     frames = spread_frames(HARD_FRAMES, len(component_names(variables)))
     document = source.document
+    contents = sha256(f"{RULES_VERSION} {_contents_hash(document)}".encode()).hexdigest()
     return SceneDescription(
         name=document.path.resolve().parent.name,
         document=document,
@@ -144,7 +145,8 @@ def read_release(path: Path | str) -> SceneDescription:
         variables=variables,
         camera_path=frames[:PATH_FRAMES],
         hard_frames=frames,
-        scene_hash=sha256(f"{RULES_VERSION} {_contents_hash(document)}".encode()).hexdigest(),
+        scene_hash=contents,
+        rendered_hash=contents,
     )
 
 
