@@ -150,7 +150,7 @@ def _begin(config: DictConfig, folder: learn.RunFolder) -> None:
     from ngi.files.code_versions import record_code_version
 
     folder.begin(scene=scene_record(config))
-    record_code_version(folder.path, after_step=folder.steps.last_step)
+    record_code_version(folder.path, after_step=folder.steps.last_step, settings=folder.settings)
 
 
 def _live_view(config: DictConfig, run: learn.Run) -> LiveView:

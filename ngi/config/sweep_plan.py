@@ -149,7 +149,7 @@ def _state(config: DictConfig, folder: Path) -> str:
     if is_longer and not any((folder / name).exists() for name in CHECKPOINTS):
         raise ValueError("it can not be trained longer: there is no checkpoint in its folder")
     made = made_with(folder, last_step=RowLog(folder / STEPS).last_step)
-    if made is not None and not same_program(made, code_version()):
+    if made is not None and not same_program(made, code_version(there)):
         if config.run.on_code_change == "restart":
             return "again"
         if config.run.on_code_change == "refuse":

@@ -2,10 +2,12 @@
 
 import json
 import logging
+from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+import ngi
 from ngi.files.durable import damage_named, write_atomically
 from ngi.machine.provenance import code_commit, code_hash
 
@@ -14,14 +16,28 @@ log = logging.getLogger(__name__)
 FILE = "commits.json"
 
 
-@cache
-def code_version() -> dict[str, Any]:
+def code_version(settings: Any = None) -> dict[str, Any]:
     """'commit' (None outside git), 'dirty', and 'code', a hash over this package's modules.
 
     As they are when it is first asked for.
+    settings: of a run, nested; modules of the user's own that it names (`_target_`) count as well
     """
+    return _version(tuple(sorted({target.partition(".")[0] for target in _targets(settings)})))
+
+
+@cache
+def _version(packages: Sequence[str]) -> dict[str, Any]:
     commit, dirty = code_commit()
-    return {"commit": commit, "dirty": dirty, "code": code_hash()}
+    own = [name for name in packages if name and name != ngi.__name__]
+    return {"commit": commit, "dirty": dirty, "code": code_hash(own)}
+
+
+def _targets(settings: Any) -> Iterator[str]:
+    if isinstance(settings, dict):
+        yield from (v for key, v in settings.items() if key == "_target_" and isinstance(v, str))
+        settings = list(settings.values())
+    for part in settings if isinstance(settings, list) else ():
+        yield from _targets(part)
 
 
 def code_versions(folder: Path) -> list[dict[str, Any]]:
@@ -38,12 +54,13 @@ def code_versions(folder: Path) -> list[dict[str, Any]]:
     return found
 
 
-def record_code_version(folder: Path, *, after_step: int) -> None:
+def record_code_version(folder: Path, *, after_step: int, settings: Any = None) -> None:
     """Adds the version with which a run is begun or goes on, and warns where it is another one.
 
     after_step: the last step that is kept of what was made before
+    settings: the run's, see `code_version`
     """
-    found, version = code_versions(folder), code_version()
+    found, version = code_versions(folder), code_version(settings)
     kept = [entry for entry in found if entry["after_step"] < after_step]
     if kept and same_program(kept[-1], version):
         _write(folder, kept)

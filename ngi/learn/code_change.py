@@ -24,7 +24,7 @@ def heed_code_change(folder: RunFolder, *, on_change: str) -> None:
     if not has_something(folder.path):
         return
     made = made_with(folder.path, last_step=folder.steps.last_step)
-    now = code_versions.code_version()
+    now = code_versions.code_version(folder.settings)
     if made is None or same_program(made, now):
         return
     change = f"{folder.path} was made with {shown(made)}, and this is {shown(now)}"

@@ -3,9 +3,12 @@
 import hashlib
 import platform
 import subprocess
+from collections.abc import Sequence
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
 from pathlib import Path
+from sysconfig import get_path
 from typing import Any
 
 import ngi
@@ -69,21 +72,40 @@ def code_commit() -> tuple[str | None, bool]:
         return None, False
 
 
-def code_hash() -> str:
+def code_hash(packages: Sequence[str] = ()) -> str:
     """16 hexadecimal digits over every module of this package, with its name.
 
     It differs between two states of the code with the same commit, if a module of the package has
-    changed. Files beside the package, which a wheel has in `DATA`, and classes that a configuration
-    takes from other packages, do not count.
+    changed. Files beside the package, which a wheel has in `DATA`, do not count.
+
+    packages: names of others, or of modules, whose files count as well where nobody has installed
+        them: those that a user is at work on
     """
     folder = Path(ngi.__file__).resolve().parent
+    modules = [(folder, f) for f in _modules(folder) if f.relative_to(folder).parts[0] != DATA]
+    modules += [each for name in packages for each in _at_work_on(name)]
     digest = hashlib.sha256()
-    found = (f for f in folder.rglob("[!.]*.py") if f.is_file())  # editors leave links to nothing
-    modules = (f for f in found if f.relative_to(folder).parts[0] != DATA)
-    for file in sorted(modules):
-        digest.update(f"{file.relative_to(folder)}\0{file.stat().st_size}\0".encode())
+    for place, file in modules:
+        digest.update(f"{file.relative_to(place)}\0{file.stat().st_size}\0".encode())
         digest.update(file.read_bytes())
     return digest.hexdigest()[:16]
+
+
+def _modules(folder: Path) -> list[Path]:
+    found = (f for f in folder.rglob("[!.]*.py") if f.is_file())  # editors leave links to nothing
+    return sorted(found)
+
+
+def _at_work_on(name: str) -> list[tuple[Path, Path]]:
+    """Files of a package or module, each with the folder that its name counts from."""
+    spec = find_spec(name)
+    if spec is None or spec.origin is None or not (origin := Path(spec.origin).resolve()).is_file():
+        return []
+    installed = (Path(get_path(place)).resolve() for place in ("stdlib", "purelib", "platlib"))
+    if any(origin.is_relative_to(place) for place in installed):
+        return []
+    files = _modules(origin.parent) if spec.submodule_search_locations else [origin]
+    return [(origin.parent, file) for file in files]
 
 
 def _processor() -> str:

@@ -17,7 +17,7 @@ from ngi.machine.provenance import code_hash
 def program_is(patch: pytest.MonkeyPatch, commit: str, code: str, *, dirty: bool = False) -> None:
     """Which version the program is from now on."""
     version = {"commit": commit * 40, "dirty": dirty, "code": code * 16}
-    patch.setattr(code_versions, "code_version", lambda: version)
+    patch.setattr(code_versions, "code_version", lambda *_: version)
 
 
 @pytest.fixture
@@ -136,3 +136,35 @@ def test_the_last_step_of_a_log(tmp_path: Path) -> None:
     folder.steps.flush()
     assert folder.steps.last_step == 2
     folder.close()
+
+
+def test_modules_that_somebody_is_at_work_on_count_where_a_run_names_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(tmp_path)
+    package = tmp_path / "own_package"
+    package.mkdir()
+    own = (tmp_path / "own_target.py", package / "__init__.py", package / "parts.py")
+    for file in own:
+        file.write_text("one = 1")
+    (tmp_path / "own_other.py").write_text("one = 1")
+    packages = ("own_package", "own_target")
+    hashes = {code_hash(), code_hash(packages)}
+    for file in own:
+        file.write_text("one = 2")
+        hashes.add(code_hash(packages))
+    assert len(hashes) == 5
+    (tmp_path / "own_other.py").write_text("one = 2")
+    assert code_hash(packages) in hashes
+    assert code_hash(("torch", "json", "builtins", "nowhere")) == code_hash()
+
+
+def test_what_a_run_names_is_found_in_its_settings(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[list[str]] = []
+    monkeypatch.setattr(code_versions, "code_hash", lambda names: asked.append(names) or "0")
+    code_versions._version.cache_clear()
+    target = {"_target_": "ngi.explore.Uniform", "parts": [{"_target_": "mine.Target"}, 3]}
+    code_versions.code_version({"sampler": target, "loss": {"_target_": "other.a.Loss"}})
+    code_versions.code_version()
+    code_versions._version.cache_clear()
+    assert asked == [["mine", "other"], []]

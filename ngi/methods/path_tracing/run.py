@@ -52,7 +52,7 @@ def run_path_tracing(
     label = {**plain(config.label), **dict.fromkeys(UNUSED, "none"), "seed": config.seed}
     folder.begin(scene=scene_record(config))
     folder.forget_logs()
-    record_code_version(folder.path, after_step=0)
+    record_code_version(folder.path, after_step=0, settings=folder.settings)
     tracker.start(folder=folder.path, settings=folder.settings, label=label)
     timed = _timed(config, plan, renderer)
     log.info("%s: %s", folder.path, timed)
