@@ -57,27 +57,22 @@ class Report:
 def write_report(folder: Path, output: Path, *, baseline: str | None = None) -> Report:
     """Reads every run below `folder` and writes the page, tables, plots, pictures into `output`.
 
-    baseline: the method that others are compared with, beside the claims; `BASELINE` where None
-    Raises ValueError where there is no run, where the runs cannot be compared and where there is
-    none of the baseline; nothing is written then.
+    baseline: what others are compared with, but for the claims; `BASELINE` where None
+    Raises ValueError where there is no run, or none of the baseline, and where the runs cannot be
+    compared; nothing is written then.
     """
     runs, warnings = find_runs(folder)
     runs = name_methods(runs)
     check_comparable(runs)
-    if baseline is None:
-        baseline = BASELINE
-    elif not any(is_baseline(run.method, baseline=baseline) for run in runs):
-        there = ", ".join(f"'{method}'" for method in methods_in_order(runs))
-        raise ValueError(f"--baseline {baseline}: there is no such run; there are {there}")
+    base = _baseline(baseline, runs)
     doubts = comparison_warnings(runs) + ways_left_out(runs)
     summaries, styles = summarise(runs), method_styles(runs)
-    comparisons, claims = compare(summaries, baseline=baseline), judge(runs)
+    comparisons, claims = compare(summaries, baseline=base), judge(runs)
     notes = _notes(runs, claims)
     films, unreadable = film_tables(folder, runs)
     found, frames = claims_table(claims), frame_table(runs)
     tables = [found, error_table(summaries), worst_table(summaries), cost_table(summaries)]
     tables += [comparison_table(comparisons), frames, *films]
-    warnings += unreadable
     output.mkdir(parents=True, exist_ok=True)
     doubtful = [*notes, *(f"Warning: {doubt}" for doubt in doubts)]
     files = _write_tables(tables, runs, summaries, doubtful, output)
@@ -90,7 +85,7 @@ def write_report(folder: Path, output: Path, *, baseline: str | None = None) -> 
         missing += lacking
     files += write_dimensions_figures(runs, output)
     exploration = write_exploration_figures(runs, styles, output)
-    warnings += doubts + missing
+    warnings += unreadable + doubts + missing
     contents = PageContents(
         name=folder.resolve().name,
         runs=runs,
@@ -103,12 +98,21 @@ def write_report(folder: Path, output: Path, *, baseline: str | None = None) -> 
         exploration_table=exploration_table(runs),
         exploration_files=exploration,
         films=films,
-        baseline=baseline,
+        baseline=base,
     )
     page = output / "index.html"
     write_page(contents, page, lambda parts: _progress(parts, "page"))
     text = _text(summaries, comparisons, [found, frames], films, notes)
     return Report(text, [page, *files, *exploration], warnings)
+
+
+def _baseline(asked_for: str | None, runs: Sequence[Run]) -> str:
+    if asked_for is None:
+        return BASELINE
+    if not any(is_baseline(run.method, baseline=asked_for) for run in runs):
+        there = ", ".join(f"'{method}'" for method in methods_in_order(runs))
+        raise ValueError(f"--baseline {asked_for}: there is no such run; there are {there}")
+    return asked_for
 
 
 def _progress(parts: Iterable[Any], what: str) -> Iterable[Any]:

@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from ngi.files.durable import write_atomically
-from ngi.machine.backend import mi
 from ngi.render.materials import collect_materials
 from ngi.render.needs import buffer_needs, buffers_are_static, direct_need, needed_layout
+from ngi.render.obstacles import obstacles
 from ngi.render.projection import require_perspective
 from ngi.render.sampling_advice import sampling_advice
 from ngi.scene.arrangement import STATIC
@@ -13,7 +13,6 @@ from ngi.scene.clearance import camera_problems, meeting_views, out_of_bounds
 from ngi.scene.description import SceneDescription
 from ngi.scene.loading import load
 from ngi.scene.scene_files import read_scene_file
-from ngi.scene.scene_parameters import has_surface
 from ngi.scene.starter import candidates, starter_yaml
 from ngi.scene.variable_scene import VariableScene
 
@@ -65,7 +64,7 @@ def describe_file(path: Path) -> str:
     if nameless:
         lines.append(f"  and {nameless} more object(s) without an id: give them one to vary them")
     lines += [
-        f"  cannot be trained on as it is: {obstacle}" for obstacle in _obstacles(scene, path)
+        f"  cannot be trained on as it is: {obstacle}" for obstacle in obstacles(scene, path=path)
     ]
     target = path.parent / "scene.yaml"
     if target.exists():
@@ -74,24 +73,6 @@ def describe_file(path: Path) -> str:
         write_atomically(target, starter_yaml(document, scene, found).encode())
         lines += ["", f"wrote {target}; adjust it, then describe its folder {path.parent}"]
     return "\n".join(lines)
-
-
-def _obstacles(scene: mi.Scene, path: Path) -> list[str]:
-    """What a renderer of this file would say is wrong with it."""
-
-    def camera() -> None:
-        require_perspective(scene, path=path)
-
-    def materials() -> None:
-        collect_materials([shape.bsdf() for shape in scene.shapes() if has_surface(shape)])
-
-    found = []
-    for check in (camera, materials):
-        try:
-            check()
-        except ValueError as error:
-            found.append(str(error))
-    return found
 
 
 def _geometry(scene: VariableScene) -> str:

@@ -15,7 +15,7 @@ def ends() -> tuple[pd.DataFrame, pd.DataFrame]:
     """Of uniform sampling and of small patches, by scene and seed."""
     uniform, small = ends_of(FOLDER / "scarce_same_time.csv")
     for runs in (uniform, small):
-        assert runs.run_seconds.tolist() == pytest.approx([600] * len(runs), rel=0.03)
+        assert runs.run_seconds.tolist() == pytest.approx([600] * len(runs), rel=0.04)
     return uniform, small
 
 
