@@ -98,7 +98,10 @@ def _modules(folder: Path) -> list[Path]:
 
 def _at_work_on(name: str) -> list[tuple[Path, Path]]:
     """Files of a package or module, each with the folder that its name counts from."""
-    spec = find_spec(name)
+    try:
+        spec = find_spec(name)
+    except ValueError:  # of what has none, such as __main__
+        return []
     if spec is None or spec.origin is None or not (origin := Path(spec.origin).resolve()).is_file():
         return []
     installed = (Path(get_path(place)).resolve() for place in ("stdlib", "purelib", "platlib"))

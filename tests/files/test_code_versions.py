@@ -156,7 +156,7 @@ def test_modules_that_somebody_is_at_work_on_count_where_a_run_names_them(
     assert len(hashes) == 5
     (tmp_path / "own_other.py").write_text("one = 2")
     assert code_hash(packages) in hashes
-    assert code_hash(("torch", "json", "builtins", "nowhere")) == code_hash()
+    assert code_hash(("torch", "json", "builtins", "__main__", "nowhere")) == code_hash()
 
 
 def test_what_a_run_names_is_found_in_its_settings(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -130,3 +130,20 @@ def test_a_scene_of_the_authors_is_found_by_its_absolute_path(tmp_path, monkeypa
 def test_what_an_older_run_names_is_found_where_it_is_now(old: str) -> None:
     group = "model" if ".models." in old else "data"
     assert made_by({group: {"_target_": old}}, group).__name__ == old.rpartition(".")[2]
+
+
+def test_modules_of_one_s_own_are_taken_where_they_are_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "own_network.py").write_text("class Network:\n    pass\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    settings = {"model": {"_target_": "own_network.Network"}}
+    for named in ("", "other", "own"):
+        monkeypatch.setenv("NGI_TRUSTED", named)
+        with pytest.raises(ValueError, match=r"If it is your own, say so: NGI_TRUSTED=own_network"):
+            made_by(settings, "model")
+    monkeypatch.setenv("NGI_TRUSTED", "other, own_network")
+    assert made_by(settings, "model").__name__ == "Network"
+    for target in ("", 3, None, "os.system"):
+        with pytest.raises(ValueError, match="which no option of the group model names"):
+            made_by({"model": {"_target_": target}}, "model")
