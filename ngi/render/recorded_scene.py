@@ -38,13 +38,14 @@ class RecordedScene:
         scene = self._scene.scene
         shapes, camera, choices = list(scene.shapes()), scene.sensors()[0], self._scene.choices
         if self._own_of != rebuilds:
-            self._own = _own(scene, [*shapes, *scene.emitters(), camera, *choices])
+            parts = [*shapes, *scene.emitters(), camera, *choices]
+            self._own = _own(scene, [*parts, *self._scene.changing])
             self._own_of = rebuilds
         return [self._own, scene.emitters_dr(), shapes, camera, choices]
 
 
 def _own(scene: mi.Scene, parts: list[mi.Object]) -> list[mi.UInt64]:
-    """Variables of a scene that are none of these parts', each once.
+    """Variables of a scene that are none of these parts', each once: they stay what they are.
 
     Where all shapes, emitters and sensors are listed, Dr.Jit would go through each of them.
     """

@@ -119,6 +119,12 @@ class VariableScene:
         return [self._parameters.object(name) for v in materials for name in v.choices]
 
     @property
+    def changing(self) -> list[mi.Object]:
+        """Every shape, and whatever else some variable acts on."""
+        variables = (v for v in self.description.variables if not isinstance(v, DiscreteVariable))
+        return [*self.shapes, *(owner for variable in variables for owner in self.owners(variable))]
+
+    @property
     def rebuilds(self) -> int | None:
         """How often Mitsuba has built the scene anew; None where every change has it do so."""
         return self._parameters.rebuilds

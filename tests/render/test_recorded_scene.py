@@ -5,11 +5,12 @@ import logging
 import pytest
 import torch
 
-from ngi.machine.backend import llvm_problem
+from ngi.machine.backend import activate, llvm_problem
 from ngi.render.mitsuba_renderer import MitsubaRenderer
 from ngi.render.recorded_scene import RecordedScene
 from ngi.scene import read_scene, scenes
 from ngi.scene.jit_variables import variables_of
+from ngi.scene.variable_scene import VariableScene
 
 pytestmark = pytest.mark.skipif(llvm_problem() is not None, reason=str(llvm_problem()))
 
@@ -57,10 +58,16 @@ def test_what_is_missing_is_looked_for_in_the_whole_scene(
     assert {record.levelname for record in caplog.records} == {"DEBUG"}
 
 
-def test_what_shapes_hold_is_not_the_scene_s_own() -> None:
-    scene = renderer_of("archviz")._scene
-    own, _, shapes, *_ = RecordedScene(scene).parts()
-    of_shapes = {variable.index for shape in shapes for variable in variables_of(shape)}
-    assert own
-    assert len({variable.index for variable in own}) == len(own)
-    assert of_shapes.isdisjoint(variable.index for variable in own)
+@pytest.mark.parametrize("name", ["archviz", "bedroom", "salon-25"])
+def test_what_can_change_is_not_the_scene_s_own(name: str) -> None:
+    """That is looked at once; a colour in there would stay what it was."""
+    activate("llvm")
+    scene = VariableScene(read_scene(**scenes()[name]))
+    own, *_ = RecordedScene(scene).parts()
+    numbers = {variable.index for variable in own}
+    assert len(numbers) == len(own) > 0
+    changing = {v.index for node in scene.changing for v in variables_of(node)}
+    assert numbers.isdisjoint(changing)
+    scene.apply([0.1] * scene.description.dimensions)
+    scene.apply([0.9] * scene.description.dimensions)
+    assert {v.index for v in RecordedScene(scene).parts()[0]} == numbers
