@@ -53,7 +53,7 @@ def test_arrays_become_one_tensor_in_the_legacy_stream_and_the_host_waits_for_no
 ) -> None:
     arrays = [CudaArray([1.0, 2.0, 3.0]), CudaArray([4.0, 5.0, 6.0])]
     assert stacked(arrays).tolist() == [[1, 4], [2, 5], [3, 6]]
-    assert [array.streams for array in arrays] == [[1], [1]]  # DLPack's name for it
+    assert [array.streams for array in arrays] == [[None], [None]]  # the legacy one, in DLPack
     assert gpu.waits.total() == 0
 
 
@@ -63,7 +63,7 @@ def test_an_array_is_written_where_it_is(gpu: Ledger) -> None:
     where = array.memory.data_ptr()
     overwrite(array, np.array([3.0, 4.0]))
     assert (array.memory.tolist(), array.memory.data_ptr()) == ([3, 4], where)
-    assert array.streams == [1]
+    assert array.streams == [None]
     assert gpu.waits.total() == 0
 
 

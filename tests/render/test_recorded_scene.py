@@ -1,6 +1,8 @@
 """What recorded kernels are given of a scene is all that they read, and not more than once."""
 
 import logging
+import subprocess
+import sys
 
 import pytest
 import torch
@@ -11,6 +13,7 @@ from ngi.render.recorded_scene import RecordedScene
 from ngi.scene import read_scene, scenes
 from ngi.scene.jit_variables import variables_of
 from ngi.scene.variable_scene import VariableScene
+from tests.docs.pages import ROOT
 
 pytestmark = pytest.mark.skipif(llvm_problem() is not None, reason=str(llvm_problem()))
 
@@ -37,15 +40,26 @@ def numbers(renderer: MitsubaRenderer) -> torch.Tensor:
     return torch.cat([patches.buffers, patches.log_radiance], dim=-1)
 
 
+ALONE = """
+import sys
+from tests.render.test_recorded_scene import RecordedScene, logging, numbers, renderer_of, torch
+
+logging.basicConfig(level=logging.DEBUG, stream=sys.stdout, format="asked again: %(name)s")
+logging.getLogger().setLevel(logging.WARNING)
+logging.getLogger("ngi.render.jit_tracer").setLevel(logging.DEBUG)
+given = numbers(renderer_of(sys.argv[1]))
+RecordedScene.parts = RecordedScene.whole
+print(torch.equal(given, numbers(renderer_of(sys.argv[1]))))
+"""
+
+
 @pytest.mark.parametrize("name", SCENES)
-def test_a_scene_and_what_is_given_of_it_trace_the_same(
-    name: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    caplog.set_level(logging.DEBUG, logger="ngi.render.jit_tracer")
-    given = numbers(renderer_of(name))
-    assert not caplog.records  # nothing had to be asked for again
-    monkeypatch.setattr(RecordedScene, "parts", RecordedScene.whole)
-    assert torch.equal(given, numbers(renderer_of(name)))
+def test_a_scene_and_what_is_given_of_it_trace_the_same(name: str) -> None:
+    """In a process of its own: Dr.Jit asks for scenes of other tests, too, where they are there."""
+    ran = subprocess.run(
+        [sys.executable, "-c", ALONE, name], capture_output=True, text=True, check=True, cwd=ROOT
+    )
+    assert ran.stdout.split("\n") == ["True", ""]
 
 
 def test_what_is_missing_is_looked_for_in_the_whole_scene(
