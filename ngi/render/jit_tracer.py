@@ -201,12 +201,24 @@ def _replayed(function: Trace, *, scene: RecordedScene, recorded: bool) -> Trace
             except RuntimeError as error:
                 if does_not_fit(error):
                     raise
+                _go_on_with_signals(error)
                 del given[0]
                 level = logging.DEBUG if given else logging.WARNING
                 _logger.log(level, "pictures of this scene take longer: %s", error)
         return function(*arguments)
 
     return trace
+
+
+def _go_on_with_signals(error: BaseException) -> None:
+    """Raises what a signal's handler has raised: Dr.Jit makes an error of whatever is raised while
+    it records.
+    """
+    cause = error.__cause__
+    while cause is not None:
+        if not isinstance(cause, Exception):  # KeyboardInterrupt, SystemExit
+            raise cause
+        cause = cause.__cause__
 
 
 def free_memory() -> None:

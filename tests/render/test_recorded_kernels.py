@@ -91,6 +91,26 @@ def test_python_traces_each_size_of_an_image_once(renderer_of_a_screen, monkeypa
         assert torch.equal(image, expected)
 
 
+@pytest.mark.parametrize("raised", [KeyboardInterrupt, SystemExit])
+def test_who_interrupts_a_recording_is_heard(
+    renderer_of_a_screen, monkeypatch, caplog, raised: type[BaseException]
+) -> None:
+    """As a handler of SIGINT or SIGTERM does, at whatever moment."""
+
+    def interrupted(*_):
+        raise raised
+
+    renderer = renderer_of_a_screen()
+    with monkeypatch.context() as patch:
+        patch.setattr(FirstHit, "channels", interrupted)
+        with pytest.raises(raised):
+            renderer.image_buffers(V, resolution=8)
+    with caplog.at_level(logging.DEBUG, logger="ngi.render.jit_tracer"):
+        found = renderer.image_buffers(V, resolution=8)
+    assert torch.equal(found, renderer_of_a_screen().image_buffers(V, resolution=8))
+    assert "WARNING" not in {record.levelname for record in caplog.records}
+
+
 def test_what_cannot_be_recorded_is_traced_each_time(
     renderer_of_a_screen, caplog, monkeypatch
 ) -> None:
