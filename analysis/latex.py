@@ -12,6 +12,7 @@ _SPECIAL = {
     "~": r"\textasciitilde{}",
     "^": r"\textasciicircum{}",
     "±": r"$\pm$",
+    "×": r"$\times$",
     "≥": r"$\ge$",
     "≤": r"$\le$",
     "–": "--",

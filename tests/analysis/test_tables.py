@@ -204,7 +204,7 @@ def test_numbers_have_three_significant_digits() -> None:
 
 
 def test_latex_has_no_sign_that_it_does_not_know() -> None:
-    text = escape("≥9.2 ± 1 – ε ≤")
+    text = escape("≥9.2 ± 1 – ε ≤ 0.85 ×")
     assert text.isascii()
     assert text.startswith(r"$\ge$9.2")
 
