@@ -98,8 +98,9 @@ def test_options_are_those_of_the_verb(verb: str) -> None:
 def test_a_run_that_is_opened_lies_where_training_has_put_it(
     page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """By a command of the same page, or by `make demo`."""
-    shown = {folder for command in commands(page) for folder in re.findall(OPENED, command)}
+    """By a command of the same page, or by `make demo`; a tutorial's own is opened by its test."""
+    opening = [command for command in commands(page) if "NGI_TRUSTED" not in command]
+    shown = {folder for command in opening for folder in re.findall(OPENED, command)}
     if not shown:
         return
     (tmp_path / "lamp").mkdir()  # the tutorial's scene
