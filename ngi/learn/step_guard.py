@@ -80,7 +80,10 @@ class Attempt:
 
 
 def gradient_norm(network: nn.Module) -> Tensor:
-    """L2 norm of the whole gradient, []; NaN or Inf where a part of it is so."""
+    """L2 norm of the whole gradient, []; NaN or Inf where a part of it is so.
+
+    Weights of a v that has no components hold nothing, which has no norm of its own.
+    """
     gradients = [p.grad for p in network.parameters() if p.grad is not None and p.grad.numel()]
     return torch.nn.utils.get_total_norm(gradients) if gradients else torch.zeros(())
 

@@ -55,15 +55,14 @@ class JitTracer(Tracer):
         first_hit: FirstHit,
         recorded: bool = True,
     ) -> None:
-        self._scene = scene.scene
+        loaded = self._scene = scene.scene
         replayed = partial(_replayed, scene=RecordedScene(scene), recorded=recorded)
         caustics = first_hit.caustics
         self._light = None if caustics is None else _PhotonLight(scene, caustics, replayed)
         self._points: dict[int, tuple[mi.Point2f, list[mi.Float]]] = {}
         # Plain functions, not methods: a frozen function follows the arrays of its arguments only,
         # and holds what is constant for this tracer in its closure.
-        scene_now = scene.scene
-        integrator = scene_now.integrator()
+        integrator = loaded.integrator()
         sampler = mi.load_dict({"type": "independent"})
 
         def trace_radiance(
@@ -71,8 +70,8 @@ class JitTracer(Tracer):
         ) -> list[mi.Float]:
             rng = sampler.fork()
             rng.seed(seed, paths)
-            ray = view.rays(scene_now, dr.arange(mi.UInt32, paths) // view.samples, rng.next_2d())
-            radiance, _, _ = integrator.sample(scene_now, rng, mi.RayDifferential3f(ray))
+            ray = view.rays(loaded, dr.arange(mi.UInt32, paths) // view.samples, rng.next_2d())
+            radiance, _, _ = integrator.sample(loaded, rng, mi.RayDifferential3f(ray))
             return _block_sums(list(mi.Color3f(radiance)), samples)
 
         def trace_buffers(
@@ -91,8 +90,8 @@ class JitTracer(Tracer):
                 pixel = dr.gather(mi.UInt32, listed, pixel)
             jitter = dr.gather(mi.Point2f, points, sample)
             light_point = [dr.gather(mi.Float, each, sample) for each in light_points]
-            ray = view.rays(scene_now, pixel, jitter)
-            return _block_sums(first_hit.channels(scene_now, ray, light_point, *light), samples)
+            ray = view.rays(loaded, pixel, jitter)
+            return _block_sums(first_hit.channels(loaded, ray, light_point, *light), samples)
 
         self._radiance = replayed(trace_radiance)
         self._buffers = replayed(trace_buffers)

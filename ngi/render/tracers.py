@@ -26,11 +26,7 @@ def tracer_of(variant: str, scene: VariableScene, first_hit: FirstHit) -> Tracer
             "1.5 cannot record on CUDA; take it out, if its precision is not needed",
             scene.description.document.path,
         )
-    tracer = JitTracer(
-        scene=scene,
-        first_hit=first_hit,
-        recorded=recorded,
-    )
+    tracer = JitTracer(scene=scene, first_hit=first_hit, recorded=recorded)
     return FittingTracer(tracer, free=free_memory)
 
 

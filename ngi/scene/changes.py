@@ -41,7 +41,8 @@ class Changes:
         bitmaps = [node for _, node in written if node.class_name().startswith("BitmapTexture")]
         if self._structure is None or any(shape not in self._structure for shape in moved):
             self._parameters.update()
-            self.rebuilds = None if self.rebuilds is None else self.rebuilds + 1
+            if self.rebuilds is not None:
+                self.rebuilds += 1
         else:
             self._tell_all_but_the_scene()
             if moved:
