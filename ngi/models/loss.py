@@ -134,7 +134,9 @@ class L1Dssim:
         The window is separable: two products with banded matrices, which for patches of this
         size take less time than convolutions.
         """
-        rows, columns = (self._band_matrix(size, images) for size in images.shape[-2:])
+        height, width = images.shape[-2:]
+        rows = self._band_matrix(height, images)
+        columns = rows if width == height else self._band_matrix(width, images)
         return rows @ images @ columns.T
 
     def _band_matrix(self, size: int, like: Tensor) -> Tensor:

@@ -186,11 +186,8 @@ class MitsubaRenderer(Renderer):
         self, scene_vector: Tensor, *, resolution: int, samples: int | None = None
     ) -> Tensor:
         """The same as a patch's at the same pixels."""
-        samples = self.buffer_samples if samples is None else samples
-        require_positive(resolution=resolution, samples=samples)
-        mi.set_variant(self._variant)
-        self._scene.apply(scene_vector)
-        return self._encode(self._whole_buffers(resolution, samples))
+        rays = self._place(scene_vector, resolution=resolution, samples=samples)
+        return self._encode(self._whole_buffers(resolution, rays))
 
     def pixel_buffers(
         self,
@@ -201,13 +198,10 @@ class MitsubaRenderer(Renderer):
         samples: int | None = None,
         caustics: bool = True,
     ) -> Tensor:
-        samples = self.buffer_samples if samples is None else max(samples, self._fewest_rays)
-        require_positive(resolution=resolution, samples=samples)
-        mi.set_variant(self._variant)
-        self._scene.apply(scene_vector)
-        parts = pixels.split(max(1, PATHS_PER_LAUNCH // samples))
+        rays = self._place(scene_vector, resolution=resolution, samples=samples)
+        parts = pixels.split(max(1, PATHS_PER_LAUNCH // rays))
         listed = [PixelList(part, resolution, caustics=caustics) for part in parts]
-        return self._encode(self._mean_buffers(listed, samples))
+        return self._encode(self._mean_buffers(listed, rays))
 
     def cameras(self, scene_vectors: Tensor) -> Tensor:
         require_told_camera(self._scene)
@@ -229,6 +223,13 @@ class MitsubaRenderer(Renderer):
         """Says how many launches did not fit into memory."""
         if isinstance(self._tracer, FittingTracer) and (split := self._tracer.split):
             _logger.warning("%d launches did not fit into memory and were traced in parts", split)
+
+    def _place(self, scene_vector: Tensor, *, resolution: int, samples: int | None) -> int:
+        """Sets the scene to v; how many rays a pixel has where `samples` are asked for."""
+        require_positive(resolution=resolution, samples=1 if samples is None else samples)
+        mi.set_variant(self._variant)
+        self._scene.apply(scene_vector)
+        return max(samples or self.buffer_samples, self._fewest_rays)
 
     def _launch_patch(
         self, state: Tensor, resolution: int, seed: int, *, sizes: list[int], attempt: int = 0

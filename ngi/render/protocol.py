@@ -127,7 +127,8 @@ class Renderer(Protocol):
     ) -> Tensor:
         """[H, W, C] float32: the first-hit buffers of the same pixels, as `layout` names them.
 
-        samples: rays per pixel; `buffer_samples` where None
+        samples: rays per pixel, or more where that many do not reach all emitters;
+            `buffer_samples` where None
         On the device that renders, so that a network on the same GPU need not wait for copies.
         Without noise, so there is no seed. A pixel with NaN or Inf is zero in all channels.
         """
@@ -145,7 +146,7 @@ class Renderer(Protocol):
         """[n, C] float32: what `image_buffers` has at n pixels, without making the others.
 
         pixels: [n] int64 on the CPU, of the image's, counted from 0 row by row; n >= 1
-        samples: as of `image_buffers`, or more where that many do not reach all emitters
+        samples: as of `image_buffers`
         caustics: False leaves their light out, whose photons take most of the time of few pixels
         """
         ...

@@ -274,7 +274,7 @@ def test_lamps_that_are_seldom_chosen_light_the_floor_as_the_others_do(load, bac
 
 @pytest.mark.parametrize("samples", [None, 1])
 def test_every_emitter_has_a_ray_however_few_are_asked_for(load, backend, samples) -> None:
-    """As a glimpse of a patch asks: of four rays and five lamps one is dark everywhere."""
+    """As glimpses and previews ask: of four rays and five lamps one is dark everywhere."""
     bulb = BULB.replace("bulb", "bulb{}").replace('value="6, 4, 2"', 'value="1, 1, 1"')
     lamps = BULB + "".join(bulb.format(number) for number in range(4))
     renderer = load(FLOOR + lamps, backend=backend, buffer_samples=2)
@@ -283,6 +283,8 @@ def test_every_emitter_has_a_ray_however_few_are_asked_for(load, backend, sample
     found = renderer.pixel_buffers(
         torch.zeros(1), pixels, resolution=RESOLUTION, samples=samples, caustics=False
     )
+    whole = renderer.image_buffers(torch.zeros(1), resolution=RESOLUTION, samples=samples)
+    torch.testing.assert_close(found, whole.flatten(0, 1)[pixels].cpu(), rtol=1e-5, atol=1e-6)
     light = found[:, renderer.layout.slice("direct")].expm1().numpy()
     floor = on_plane(ORIGIN, rays(RESOLUTION), np.zeros(3), [0, 0, 1])
     expected = lit_by_the_bulb(floor, [0, 0, 1]) * (1 + 4 / INTENSITY)
