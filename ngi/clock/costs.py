@@ -4,7 +4,8 @@ A run's steps are of three kinds: on stored patches, on newly generated ones, an
 for which the chains' current states are scored too. What they cost is put together from
 
 - training: any step, at the price of one on stored patches (phases reuse, train, other);
-- exploring: what a generated step takes more for proposing, accepting and storing (explore, reuse);
+- exploring: what a generated step takes more for proposing, accepting and storing (explore, reuse),
+  and for telling its losses' noise from two halves (score);
 - rendering: the patches of a generated step (render);
 - scoring: all that a scored step takes more than one that is not (score).
 

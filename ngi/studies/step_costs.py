@@ -141,7 +141,7 @@ def step_seconds(rounds: Iterable[list[TimedStep]]) -> dict[str, Seconds]:
     Where another process disturbs a step, the next kind can come out below it; costs are then 0.
     """
     training: Seconds = {"reuse": [], "train": [], "other": []}
-    exploring: Seconds = {"explore": [], "reuse": []}
+    exploring: Seconds = {"explore": [], "reuse": [], "score": []}
     scoring: Seconds = {"score": []}
     for generated, reused, *further in rounds:
         for phase, values in training.items():
@@ -149,8 +149,9 @@ def step_seconds(rounds: Iterable[list[TimedStep]]) -> dict[str, Seconds]:
             values.append(statistics.mean(stored))
         # The chains accept in the generated step; for the next, they propose in the reused one.
         exploring["explore"].append(generated.seconds["explore"] + reused.seconds["explore"])
-        more = generated.seconds["reuse"] - reused.seconds["reuse"]
-        exploring["reuse"].append(max(0.0, more))
+        for phase in ("reuse", "score"):  # the losses' noise is told from two halves, as a score
+            more = generated.seconds[phase] - reused.seconds[phase]
+            exploring[phase].append(max(0.0, more))
         if further:
             scoring["score"].append(max(0.0, further[0].own - generated.own))
     measured = {"training": training, "exploring": exploring}

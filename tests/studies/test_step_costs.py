@@ -18,7 +18,7 @@ def test_costs_are_differences_between_kinds_of_steps() -> None:
     measured = step_seconds([[GENERATED, REUSED, SCORED, SECOND_REUSED]])
     assert measured == {
         "training": {"reuse": [3.0], "train": [12.0], "other": [3.0]},
-        "exploring": {"explore": [3.0], "reuse": [2.0]},
+        "exploring": {"explore": [3.0], "reuse": [2.0], "score": [0.0]},
         "scoring": {"score": [(1 + 9 + 12 + 30) - (1 + 6 + 10)]},
     }
 
@@ -28,6 +28,14 @@ def test_without_scored_steps_there_is_no_cost_of_scoring() -> None:
     assert set(measured) == {"training", "exploring"}
     assert measured["training"]["train"] == [11.0, 13.0]
     assert measured["exploring"]["explore"] == [3.0, 1.0]
+
+
+def test_what_tells_noise_from_two_halves_is_counted_once() -> None:
+    generated = step(generated=True, explore=1, train=10, score=7)
+    scored = step(generated=True, scored=True, explore=1, train=10, score=37)
+    measured = step_seconds([[generated, REUSED, scored, SECOND_REUSED]])
+    assert measured["exploring"]["score"] == [7.0]
+    assert measured["scoring"] == {"score": [30.0]}
 
 
 def test_a_disturbed_step_gives_no_negative_cost() -> None:
