@@ -16,6 +16,7 @@ from torch.quasirandom import SobolEngine
 
 from ngi.machine.backend import dr, mi
 from ngi.patches import BufferLayout
+from ngi.render.tracing import stratified
 
 
 def emission(scene: mi.Scene, hit: mi.SurfaceInteraction3f) -> mi.Color3f:
@@ -42,9 +43,9 @@ def light_points(count: int, emitters: NDArray[np.float64] = _ONE) -> NDArray[np
     the lobe; and the weight of the emitter sample.
 
     The points of a pixel are the number of the point and the first dimension of a Sobol sequence
-    (a Hammersley set); these are later dimensions of it (Joe and Kuo 2008), shifted to the cells'
-    middle as well. 16 of them have one point in every elementary interval of each pair that is used
-    together, and of each dimension together with the number of the point.
+    (a Hammersley set); these are later dimensions of it (Joe and Kuo 2008), `stratified` as well.
+    16 of them have one point in every elementary interval of each pair that is used together, and
+    of each dimension together with the number of the point.
 
     Each emitter has a whole number of points, at least one, the same in all pixels: by itself an
     emitter of probability 0.1 would be as bright as 2 of 16 points make it. The weight is what its
@@ -53,9 +54,8 @@ def light_points(count: int, emitters: NDArray[np.float64] = _ONE) -> NDArray[np
 
     emitters: [e] probability with which each is chosen, see `emitter_probabilities`
     """
-    cells = 2 ** int(count - 1).bit_length()
-    sobol = SobolEngine(max(_SOBOL_DIMENSIONS) + 1).draw(count).double().numpy()
-    points: NDArray[np.float64] = sobol[:, _SOBOL_DIMENSIONS] + 0.5 / cells
+    sobol = SobolEngine(max(_SOBOL_DIMENSIONS) + 1).draw(count).numpy()
+    points = stratified(sobol[:, _SOBOL_DIMENSIONS])
     if not 1 < np.count_nonzero(emitters) <= count:
         return np.column_stack([points, np.ones(count)])
     shares = _shares(emitters, count)

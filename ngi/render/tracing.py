@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from hashlib import blake2b
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import torch
@@ -86,7 +86,7 @@ class Tracer(Protocol):
 
 
 def subpixel_points(count: int) -> NDArray[np.float64]:
-    """[count, 2] points of a Hammersley set in the unit square, shifted to the cells' middle.
+    """[count, 2] points of a Hammersley set in the unit square, see `stratified`.
 
     The buffers use the same points in every pixel: no noise, and no dependence on a seed. One
     point is the pixel's centre.
@@ -94,8 +94,14 @@ def subpixel_points(count: int) -> NDArray[np.float64]:
     indices = np.arange(count)
     bits = max(1, int(count - 1).bit_length())
     reversed_bits = sum(((indices >> bit) & 1) << (bits - 1 - bit) for bit in range(bits))
-    second = (reversed_bits + 0.5) / 2**bits if count > 1 else np.array([0.5])
-    return np.stack([(indices + 0.5) / count, second], axis=1)
+    return stratified(np.stack([indices, reversed_bits], axis=1))
+
+
+def stratified(points: NDArray[Any]) -> NDArray[np.float64]:
+    """Points [n, k], in every dimension moved to the middle of one of n equal cells, in their
+    order: the mean is 0.5 however many there are.
+    """
+    return (points.argsort(axis=0).argsort(axis=0) + 0.5) / len(points)
 
 
 def derive_seed(*parts: int | bytes) -> int:

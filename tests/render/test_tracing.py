@@ -1,7 +1,9 @@
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ngi.render.direct_light import light_points
 from ngi.render.tracing import derive_seed, subpixel_points
 
 
@@ -14,9 +16,17 @@ def test_subpixel_points_lie_in_the_pixel_and_are_spread(count) -> None:
     assert len(np.unique(points[:, 0])) == len(np.unique(points[:, 1])) == count
 
 
-def test_a_power_of_two_of_points_averages_to_the_centre() -> None:
-    for count in (1, 2, 16, 64):
-        np.testing.assert_allclose(subpixel_points(count).mean(0), 0.5)
+@pytest.mark.parametrize("count", [1, 2, 3, 5, 6, 16, 17, 64])
+def test_points_average_to_the_centre(count) -> None:
+    np.testing.assert_allclose(subpixel_points(count).mean(0), 0.5)
+    np.testing.assert_allclose(light_points(count)[:, :5].mean(0), 0.5)
+
+
+def test_sixteen_points_are_the_hammersley_set_in_its_cells_middle() -> None:
+    """Hammersley 1960: (i / n, radical inverse of i in base 2)."""
+    inverse = [int(f"{index:04b}"[::-1], 2) for index in range(16)]
+    expected = (np.stack([np.arange(16), inverse], axis=1) + 0.5) / 16
+    np.testing.assert_array_equal(subpixel_points(16), expected)
 
 
 def test_seeds_depend_on_every_part_and_their_limits() -> None:
