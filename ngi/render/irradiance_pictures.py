@@ -26,8 +26,11 @@ many of equal power as have the same relative variance.
 TOLERANCE = 8
 """Cells between a surface and the light of its picture, beyond which it is another surface's."""
 
-_RESOLUTION = 2.0**-20
-"""Of the sums over photons, in units of the brightest one."""
+_RESOLUTION = 2.0**-32
+_RESOLUTION_OF_SQUARES = 2.0**-44
+"""Of the sums over photons, in units of the brightest one: a 100,000th as bright counts alike,
+and 2^18 of the brightest in one cell are not too many for 64 bits.
+"""
 
 _NO_LIGHT = 1e-30
 """Irradiance of the brightest photon where none arrives."""
@@ -57,13 +60,15 @@ class IrradiancePictures:
         light /= unit
         mean = dr.mean(light)
         values = (*light, mean * depth, dr.square(mean))
+        steps = (*4 * (_RESOLUTION,), _RESOLUTION_OF_SQUARES)
         sums = [dr.zeros(mi.UInt64, 6 * CELLS * CELLS) for _ in values]
-        for total, value in zip(sums, values, strict=True):
-            number = mi.Int64(dr.round(value / _RESOLUTION))
+        for total, value, step in zip(sums, values, steps, strict=True):
+            number = mi.Int64(dr.round(value / step))
             # CUDA adds none with a sign. A copy per thread, the default, would be 63 MB to clear.
             dr.scatter_add(total, mi.UInt64(number), index, active, dr.ReduceMode.Local)
         dr.eval(sums)
-        return _resolved([mi.Float(mi.Int64(total)) * _RESOLUTION for total in sums], unit)
+        scaled = zip(sums, steps, strict=True)
+        return _resolved([mi.Float(mi.Int64(total)) * step for total, step in scaled], unit)
 
     def dark(self) -> mi.Float:
         """As `of_photons` where none arrives."""
@@ -122,7 +127,9 @@ def _resolved(sums: list[mi.Float], unit: mi.Float) -> mi.Float:
         mean = dr.mean(mi.Color3f(total))
         # What is expected of this level: chosen by what it has, too much light would be found.
         enough = 1 if level == LEVELS - 1 else dr.clip(2 * photons / ENOUGH_PHOTONS - 1, 0, 1)
-        photons = dr.square(mean) / dr.maximum(squares, _RESOLUTION)  # as in four finer cells
+        photons = dr.square(mean) / dr.maximum(
+            squares, _RESOLUTION_OF_SQUARES
+        )  # as in four finer cells
         light = dr.lerp(light, mi.Color3f(total) / 4**level, enough)
         depth = dr.select(mean > 0, deep / mean, depth)
     packed = dr.zeros(mi.Float, 4 * 6 * CELLS * CELLS)
