@@ -19,6 +19,9 @@ NEWER_SHARE = 1 / 8
 SEEN_TOGETHER = 64
 """Losses that the network had as much training for, roughly."""
 
+MOST_NUMBERS = 2**28
+"""That a forest is grown from at once: a gigabyte, which is needed some four times."""
+
 
 @dataclass(frozen=True)
 class PredictedState(ChainState):
@@ -94,7 +97,17 @@ class PredictedLoss:
         self._forest = {"trees": trees, "depth": depth, "smallest_leaf": smallest_leaf}
 
     def init(self, state_dimensions: int) -> PredictedState:
-        """See `MarkovChains.init`: nothing seen yet."""
+        """See `MarkovChains.init`: nothing seen yet.
+
+        Raises ValueError where a forest of so many variables would not fit into memory.
+        """
+        numbers = self._forest["trees"] * self._memory * state_dimensions
+        if numbers > MOST_NUMBERS:
+            raise ValueError(
+                f"sampler.memory: {self._forest['trees']} trees of {self._memory} states with "
+                f"{state_dimensions} variables are {numbers:.1g} numbers, several times; give less "
+                "of sampler.memory or sampler.trees, or choose sampler=sobol"
+            )
         forest = Forest.flat(trees=self._forest["trees"], depth=self._forest["depth"])
         return PredictedState.empty(
             self.chains,

@@ -142,6 +142,14 @@ def test_numbers_out_of_range_are_refused(change: dict[str, int], named: str) ->
         sampler(**change)
 
 
+def test_a_forest_that_no_memory_holds_is_refused_before_anything_is_rendered() -> None:
+    """A texture of 148 x 148 texels that vary by themselves, as another scene may have them."""
+    found = sampler(memory=4096, trees=4)
+    assert found.init(2**14).seen.numel() == 0
+    with pytest.raises(ValueError, match=r"sampler\.memory: 4 trees of 4096 states with 21906 var"):
+        found.init(148 * 148 + 2)
+
+
 def stream(folder: Path) -> TrainingStream:
     renderer = PocketRenderer(dimensions=3, volume=0.1, pockets=1, sharpness=0.0, patch_size=8)
     return make(folder, sampler=sampler(), renderer=renderer, rule=Epochs())
