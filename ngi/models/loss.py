@@ -16,6 +16,10 @@ class SampleLoss(Protocol):
         ...
 
 
+LEAST_OFFSET = 1e-5
+"""Of `log_of_radiance`: 1 − offset is rounded by 6e-8."""
+
+
 def log_of_radiance(log1p_radiance: Tensor, *, offset: float) -> Tensor:
     """log(r + offset) of log1p radiance, also where r would overflow; of negative r that of 0."""
     above = log1p_radiance.clamp_min(0)
@@ -73,9 +77,14 @@ class L1Dssim:
                 "loss.mirrored: true: the release has zeros around a patch (loss.release_layout: "
                 "true); choose one of both"
             )
-        for name in ("sigma", "k1", "k2", "data_range", "relative_offset"):
+        for name in ("sigma", "k1", "k2", "data_range"):
             if getattr(self, name) <= 0:
                 raise ValueError(f"loss.{name} is {getattr(self, name)}: it must be above 0")
+        if self.relative_offset < LEAST_OFFSET:
+            raise ValueError(
+                f"loss.relative_offset is {self.relative_offset}: it must be {LEAST_OFFSET} or "
+                "more, or single precision does not tell black from less"
+            )
 
     def __call__(self, prediction: Tensor, target: Tensor) -> Tensor:
         """Log1p radiance [n, P, P, 3], predicted and rendered, to the loss of each sample, [n].

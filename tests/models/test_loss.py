@@ -181,6 +181,7 @@ def test_the_releases_loss() -> None:
         ({"sigma": 0}, "loss.sigma is 0"),
         ({"data_range": -1}, "loss.data_range is -1"),
         ({"relative_offset": 0}, "loss.relative_offset is 0"),
+        ({"relative_offset": 1e-8}, "loss.relative_offset is 1e-08: it must be 1e-05 or more"),
     ],
 )
 def test_bad_options_are_named(options, message) -> None:
