@@ -35,8 +35,8 @@ from ngi.render.protocol import Renderer
 Costs = dict[str, dict[str, float]]
 """Component -> phase -> seconds per step that the component belongs to."""
 
-OF_IMAGES = "supersampled_edges"
-"""What of the samples' settings concerns no step."""
+COSTING_NO_STEP = ("supersampled_edges", "centred")
+"""What of the samples' settings concerns images alone, or where patches are."""
 
 NOT_AVERAGED = "ngi.models.no_average"
 """What conf/averaging/none.yaml names."""
@@ -73,7 +73,7 @@ def components(settings: Mapping[str, Any], *, renderer: Renderer, scored: bool)
     samples = {
         key: value
         for key, value in settings["data"].items()
-        if not key.startswith("_") and key != OF_IMAGES
+        if not key.startswith("_") and key not in COSTING_NO_STEP
     }
     # Else nothing, so that what is measured already stays what it is called.
     if renderer.halves:

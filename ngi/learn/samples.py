@@ -13,6 +13,7 @@ from ngi.learn.glimpses import glimpsed_buffers
 from ngi.learn.supersampling import quarters, with_quarters
 from ngi.patches import BufferLayout, Patches
 from ngi.render.protocol import Deferred, PatchJob, Renderer
+from ngi.render.tracing import of_centres
 
 Example = tuple[tuple[Tensor, ...], Tensor]
 """The network's inputs, its arguments in order, and the log1p radiance that it is to give."""
@@ -103,6 +104,8 @@ class PatchSamples(Samples):
     traced_share: see `ngi.denoise.denoised`
     supersampled_edges: whether the network is asked for each quarter of the pixels that show
         several surfaces, see `ngi.learn.supersampling`; in images alone, not in training
+    centred: whether a state's position is that of the patch's centre, see
+        `ngi.render.tracing.of_centres`, instead of its corner's, as in the paper
 
     components: which of v, [0, D), the network is given, in order
     Raises ValueError for a share that is none.
@@ -116,11 +119,13 @@ class PatchSamples(Samples):
         denoiser: Denoiser | None = None,
         traced_share: float = 0.5,
         supersampled_edges: bool = False,
+        centred: bool = False,
     ) -> None:
         if not 0 <= traced_share <= 1:
             raise ValueError(f"data.traced_share is {traced_share}; expected 0 to 1")
         self._renderer = renderer
         self.supersampled_edges = supersampled_edges
+        self._centred = centred
         self.layout = renderer.layout
         self._denoise = None
         if denoiser is not None:
@@ -140,12 +145,14 @@ class PatchSamples(Samples):
         }
 
     def start_patches(self, states: Tensor, *, resolution: int, seed: int) -> PatchJob:
-        job = self._renderer.start_patches(states, resolution=resolution, seed=seed)
+        placed = self._placed(states, resolution)
+        job = self._renderer.start_patches(placed, resolution=resolution, seed=seed)
         return job if self._denoise is None else Deferred(self._denoise, job)
 
     def glimpses(self, states: Tensor, *, resolution: int) -> tuple[Tensor, ...]:
         """Buffers [n, h, w, C] of one pixel in 16, and v [n, D], or what is seen of it."""
-        buffers = glimpsed_buffers(states, self._renderer, resolution=resolution)
+        placed = self._placed(states, resolution)
+        buffers = glimpsed_buffers(placed, self._renderer, resolution=resolution)
         return buffers, self._of(states[:, :-2])
 
     def example(self, patches: Patches) -> Example:
@@ -169,6 +176,12 @@ class PatchSamples(Samples):
             return image
         pixels, of_quarters = finer
         return with_quarters(image, pixels, image_of(network, of_quarters, seen))
+
+    def _placed(self, states: Tensor, resolution: int) -> Tensor:
+        """As the renderer is given them."""
+        if not self._centred:
+            return states
+        return of_centres(states, patch_size=self.patch_size, resolution=resolution)
 
     def _of(self, scene_vectors: Tensor) -> Tensor:
         if len(self.components) == self.dimensions:

@@ -186,3 +186,17 @@ def patch_window(position: Tensor, *, patch_size: int, resolution: int) -> Windo
     last = resolution - patch_size
     x, y = (min(int(p * (last + 1)), last) for p in position.tolist())
     return Window(x, y, patch_size, patch_size, resolution)
+
+
+def of_centres(states: Tensor, *, patch_size: int, resolution: int) -> Tensor:
+    """States [n, D + 2] whose patches have their centres where the given ones' positions are.
+
+    Of positions drawn uniformly, `patch_window` alone has few patches reach the image's border: of
+    patches of 32 pixels in an image of 96, a pixel in a corner is in 1/500 as many as the mean
+    pixel. Here a position (x, y) in [0, 1]^2 is the centre of a patch anywhere in the image,
+    which is moved into it: no pixel is in less than a quarter as many as the mean one.
+    """
+    last = resolution - patch_size
+    centres = (states[:, -2:].double() * (resolution + 1)).floor()
+    corners = (centres - patch_size // 2).clamp(0, last)
+    return torch.cat([states[:, :-2], ((corners + 0.5) / (last + 1)).to(states)], dim=1)

@@ -162,6 +162,10 @@ def test_how_edges_are_shown_costs_no_step_anything() -> None:
     assert keys("method=ours") == keys("method=ours_supersampled")
 
 
+def test_where_patches_are_costs_no_step_anything() -> None:
+    assert keys("method=ours") == keys("method=ours_without/centred_patches")
+
+
 def test_without_an_average_a_cost_is_called_as_before_there_were_any() -> None:
     assert run_config().averaging["_target_"] == NOT_AVERAGED
 

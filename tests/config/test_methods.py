@@ -194,6 +194,7 @@ CHANGED = {
     "relative_positions": "model",
     "relative_loss": "loss",
     "camera_left_out": "data",
+    "centred_patches": "data",
     "denoised_targets": "data",
     "direct_light": "renderer",
     "caustics": "renderer",

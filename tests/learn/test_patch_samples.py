@@ -7,6 +7,7 @@ from torch import nn
 
 from ngi.denoise import denoised, guides
 from ngi.learn import PatchSamples, network_of, seeded
+from ngi.learn.glimpses import sparse
 from ngi.patches import BufferLayout, MovingPoints
 from ngi.render import AnalyticRenderer
 
@@ -149,3 +150,15 @@ def test_the_paper_gives_all_of_v() -> None:
     v = torch.rand(SCENE_VARIABLES + 2)
     assert samples.network_arguments["scene_dimensions"] == SCENE_VARIABLES + 2
     assert torch.equal(samples.test_inputs(v, torch.zeros(64, 64, 1))[0], v)
+
+
+def test_centred_patches_are_seen_and_traced_around_their_positions() -> None:
+    renderer = AnalyticRenderer(dimensions=1, patch_size=16)
+    samples = PatchSamples(renderer=renderer, centred=True)
+    states = torch.tensor([[0.5, 0.0, 0.7], [0.5, 0.25, 0.25], [0.5, 0.5, 1.0]])
+    image = renderer.image_buffers(states[0, :1], resolution=64)
+    patches = samples.start_patches(states, resolution=64, seed=0).result().buffers
+    for patch, (x, y) in zip(patches, [(0, 37), (8, 8), (24, 48)], strict=True):
+        torch.testing.assert_close(patch, image[y : y + 16, x : x + 16])
+    seen, _ = samples.glimpses(states, resolution=64)
+    torch.testing.assert_close(seen, sparse(patches))

@@ -1,10 +1,11 @@
 import numpy as np
 import pytest
+import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
 from ngi.render.direct_light import light_points
-from ngi.render.tracing import derive_seed, subpixel_points
+from ngi.render.tracing import derive_seed, of_centres, patch_window, subpixel_points
 
 
 @given(st.integers(1, 70))
@@ -27,6 +28,34 @@ def test_sixteen_points_are_the_hammersley_set_in_its_cells_middle() -> None:
     inverse = [int(f"{index:04b}"[::-1], 2) for index in range(16)]
     expected = (np.stack([np.arange(16), inverse], axis=1) + 0.5) / 16
     np.testing.assert_array_equal(subpixel_points(16), expected)
+
+
+@pytest.mark.parametrize(("patch_size", "resolution"), [(32, 96), (16, 96), (32, 600), (5, 5)])
+def test_centres_are_anywhere_in_the_image_and_patches_are_moved_into_it(
+    patch_size, resolution
+) -> None:
+    """Between any two pixels, or at the border, as often as anywhere else."""
+    centres = np.arange(resolution + 1)
+    positions = torch.from_numpy((centres + 0.5) / (resolution + 1)).float()
+    states = torch.stack([torch.full_like(positions, 0.3), positions, positions.flip(0)], dim=1)
+    placed = of_centres(states, patch_size=patch_size, resolution=resolution)
+    assert torch.equal(placed[:, 0], states[:, 0])
+    windows = [
+        patch_window(state[1:], patch_size=patch_size, resolution=resolution) for state in placed
+    ]
+    corners = np.clip(centres - patch_size // 2, 0, resolution - patch_size)
+    assert [window.x for window in windows] == corners.tolist()
+    assert [window.y for window in windows] == corners[::-1].tolist()
+    inside = np.arange(resolution)[:, None]
+    times = ((corners <= inside) & (inside < corners + patch_size)).sum(axis=1)
+    assert (np.outer(times, times) >= np.outer(times, times).mean() / 4).all()
+
+
+def test_positions_at_the_limits_are_in_the_image() -> None:
+    states = torch.tensor([[0.0, 1.0], [1.0, 0.0]])
+    placed = of_centres(states, patch_size=4, resolution=12)
+    windows = [patch_window(state, patch_size=4, resolution=12) for state in placed]
+    assert [(window.x, window.y) for window in windows] == [(0, 8), (8, 0)]
 
 
 def test_seeds_depend_on_every_part_and_their_limits() -> None:
