@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import torch
 from torch import Tensor
-from torch.quasirandom import SobolEngine
 
+from ngi.explore.space_filling import SobolSequence
 from ngi.learn.samples import Example, Samples
 from ngi.patches import Patches
 from ngi.render.protocol import Deferred, PatchJob, RenderedPatches, Renderer
@@ -103,8 +103,8 @@ class ObservationSets(Samples):
     ) -> tuple[Tensor, ...]:
         """The observations keep the resolution of training."""
         observations, components = self._shape
-        engine = SobolEngine(max(components, 1), scramble=True, seed=TEST_SEED)
-        taken_from = engine.draw(observations)[:, :components].flatten()
+        points = SobolSequence(seed=TEST_SEED).points(0, observations, max(components, 1))
+        taken_from = points[:, :components].flatten()
         views = self._views(torch.cat([scene_vector, taken_from])[None])
         states = _placed(views, torch.full((1, 2), 0.5))[0, 1:]
         rendered = self._renderer.render_patches(states, resolution=self.patch_size, seed=TEST_SEED)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 import torch
 
+from ngi.evaluate.protocol import EvaluationProtocol, _spread
 from ngi.explore import Proposals
 from ngi.learn.ahead import ProposalsAhead
 from ngi.methods.cnsr import ObservationSets
@@ -125,6 +126,14 @@ def test_a_test_frame_is_observed_in_its_own_scene_always_from_the_same_cameras(
     again = samples.test_inputs(first, torch.zeros(48, 48, 1))
     for a, b in zip(again, samples.test_inputs(first, torch.zeros(96, 96, 1)), strict=True):
         assert torch.equal(a, b)
+
+
+def test_no_test_frame_is_observed_from_its_own_camera(samples) -> None:
+    """Sobol sequences of one seed begin with the same point, however many dimensions they have."""
+    frames = _spread(8, D, seed=EvaluationProtocol.sobol_seed)
+    observed_from = 2 * (samples.test_inputs(frames[0], torch.zeros(48, 48, 1))[2][:, :2] - 0.25)
+    for first in range(D - 1):  # wherever in v the camera is
+        assert torch.cdist(observed_from, frames[:, first : first + 2]).min() > 1e-3
 
 
 def test_blank_sets_have_the_shapes_of_rendered_ones(samples) -> None:
