@@ -192,7 +192,7 @@ def of_centres(states: Tensor, *, patch_size: int, resolution: int) -> Tensor:
     """States [n, D + 2] whose patches have their centres where the given ones' positions are.
 
     Of positions drawn uniformly, `patch_window` alone has few patches reach the image's border: of
-    patches of 32 pixels in an image of 96, a pixel in a corner is in 1/500 as many as the mean
+    patches of 32 pixels in an image of 96, a pixel in a corner is in 1/469 as many as the mean
     pixel. Here a position (x, y) in [0, 1]^2 is the centre of a patch anywhere in the image,
     which is moved into it: no pixel is in less than a quarter as many as the mean one.
     """
