@@ -79,9 +79,10 @@ def test_patches_added_amid_an_epoch_come_with_the_next(make_patches) -> None:
     store.add(make_patches(2, first=6))
     assert sorted([*begun, *store.draw(4, numbers).tolist()]) == [0, 1, 2, 3, 4, 5]
     assert sorted(store.draw(8, numbers).tolist()) == [0, 1, 2, 3, 4, 5, 6, 7]
-    store.draw(2, numbers)
-    store.add(make_patches(3, first=8))  # into the slots of 0, 1 and 2
-    assert set(store.draw(6, numbers).tolist()) <= {3, 4, 5, 6, 7, 8, 9, 10}
+    begun = store.draw(2, numbers).tolist()
+    store.add(make_patches(3, first=8))  # in the place of 0, 1 and 2
+    rest = [{0: 8, 1: 9, 2: 10}.get(old, old) for old in range(8) if old not in begun]
+    assert sorted(store.draw(6, numbers).tolist()) == sorted(rest)
 
 
 def drawn_and_weighted(make_patches, rule, losses, count=20_000):
@@ -149,6 +150,25 @@ def test_the_papers_reuse_is_the_case_of_exponent_1_without_weights(make_patches
     assert torch.equal(ids, same)
     assert torch.equal(weights, torch.ones(len(ids)))
     assert none is None
+
+
+def test_weights_of_patches_count_besides_those_of_the_rule(make_patches) -> None:
+    store = PatchStore(
+        capacity=3, layout=LAYOUT, rule=Prioritised(alpha=0.6, beta=1.0, epsilon=0.01)
+    )
+    store.add(make_patches(3), torch.tensor([4.0, 1.0, 2.0]))
+    store.update(torch.arange(3), torch.tensor([0.3, 1.7, 0.02]))
+    inverse = (np.array([0.02, 0.3, 1.7]) + 0.01) ** -0.6
+    found = store.loss_weights(torch.tensor([2, 0, 1]))
+    assert found.dtype == torch.float32
+    np.testing.assert_allclose(found, [2, 4, 1] * inverse / inverse.max(), rtol=1e-6)
+
+
+def test_the_weight_of_a_patch_goes_with_it(make_patches) -> None:
+    store = PatchStore(capacity=3, layout=LAYOUT)
+    store.add(make_patches(3), torch.tensor([4.0, 1.0, 2.0]))
+    (new,) = store.add(make_patches(1, first=3))  # in the place of the first
+    assert store.loss_weights(torch.tensor([1, new, 2])).tolist() == [1, 1, 2]
 
 
 @pytest.mark.parametrize("losses", [[0.0] * 5, [1e30] * 5, [3e-324] * 5])
