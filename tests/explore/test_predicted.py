@@ -1,12 +1,15 @@
 """The sampler that draws by a forest's predictions."""
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 from scipy import stats
 
-from ngi.explore import Importance, PredictedLoss
+from ngi.explore import Importance, PredictedLoss, predicted
+from ngi.explore.forest import Forest
 from ngi.learn import TrainingStream
 from ngi.render import PocketRenderer
 from ngi.reuse import Epochs
@@ -84,6 +87,30 @@ def test_losses_count_among_those_of_their_time() -> None:
     found = sampler(memory=1024, importance=Importance(uniform_share=0.2, power=4.0))
     states, _ = explored(found, batches=150, untrained=30)
     assert lit(states).mean() > 3 * 0.09
+
+
+def test_losses_are_divided_by_the_mean_of_those_around_them(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of the first and the last 64 where there are fewer before or after them."""
+    through: list[torch.Tensor] = []
+
+    def recorded(_: torch.Tensor, losses: torch.Tensor, *__: object, **___: object) -> Forest:
+        through.append(losses)
+        return Forest.flat(trees=8, depth=5)
+
+    monkeypatch.setattr(predicted, "grow", recorded)
+    found, generator = sampler(), torch.Generator().manual_seed(0)
+    ramp, ids, zeros = torch.arange(1.0, 201.0), torch.arange(CHAINS), torch.zeros(CHAINS)
+    earlier = ramp[:-CHAINS]
+    state = replace(
+        found.init(3), seen=torch.zeros(len(earlier), 3), loss=earlier, newer=torch.tensor(40)
+    )
+    proposals = found.propose(state, generator, batch=49)
+    found.accept(state, proposals, ids, zeros, zeros, generator, losses=ramp[-CHAINS:])
+    means = np.convolve(ramp, np.full(64, 1 / 64), mode="valid")
+    around = np.pad(means, (32, 31), mode="edge")
+    np.testing.assert_allclose(through[0], ramp.numpy() / around, rtol=1e-5)
 
 
 def test_without_weights_nothing_weighs() -> None:

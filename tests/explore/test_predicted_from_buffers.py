@@ -1,7 +1,7 @@
 """The sampler that looks at states before they are rendered."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import pytest
@@ -83,8 +83,13 @@ def test_of_equal_predictions_the_less_settled_come_first() -> None:
     assert wave(chosen).mean() > 0.8
 
 
-def looks(found: PredictedFromBuffers, *, batches: int, dimensions: int) -> list[torch.Tensor]:
-    """The states that are described in the first batches of a run, which chooses any of them."""
+def looks(
+    found: PredictedFromBuffers, *, batches: Sequence[int], dimensions: int, lost: float = 0.0
+) -> list[torch.Tensor]:
+    """The states that are described in these batches of a run, which chooses any of them.
+
+    lost: on the first patch of each of the first two batches
+    """
     asked: list[torch.Tensor] = []
 
     def describe(states: torch.Tensor) -> torch.Tensor:
@@ -92,17 +97,19 @@ def looks(found: PredictedFromBuffers, *, batches: int, dimensions: int) -> list
         return torch.ones(len(states), 1)
 
     generator, state = torch.Generator().manual_seed(8), found.init(dimensions)
-    for batch in range(batches):
+    for batch in batches:
         proposals = found.propose(state, generator, batch=batch, describe=describe)
-        ids, zeros = torch.arange(CHAINS), torch.zeros(CHAINS)
-        state, _ = found.accept(state, proposals, ids, zeros, zeros, generator, losses=zeros)
+        ids, zeros, losses = torch.arange(CHAINS), torch.zeros(CHAINS), torch.zeros(CHAINS)
+        if batch in batches[:2]:
+            losses[0] = lost
+        state, _ = found.accept(state, proposals, ids, zeros, zeros, generator, losses=losses)
         assert all((asked[-1] == chosen).all(dim=1).any() for chosen in proposals.position)
         assert len(proposals.position[:, :-2].unique(dim=0)) == CHAINS
     return asked
 
 
 def test_candidates_are_four_patches_each_of_a_few_images() -> None:
-    groups = looks(looking(), batches=3, dimensions=5)[-1].unflatten(0, (16, 4))
+    groups = looks(looking(), batches=range(3), dimensions=5)[-1].unflatten(0, (16, 4))
     assert (groups[:, :, :-2] == groups[:, :1, :-2]).all()
     assert len(groups[:, 0, :-2].unique(dim=0)) == 16
     assert len(groups[..., -2:].flatten(0, 1).unique(dim=0)) == 64
@@ -114,12 +121,19 @@ def test_candidates_are_four_patches_each_of_a_few_images() -> None:
 
 def test_what_is_looked_at_goes_through_one_sequence() -> None:
     """So does what is not chosen yet: equal intervals of a variable hold as many points each."""
-    first, *others = looks(looking(uniform_first=32), batches=38, dimensions=5)
+    first, *others = looks(looking(uniform_first=32), batches=range(38), dimensions=5)
     asked = torch.cat([first, *others[:7], *[group[::4] for group in others[7:]]])
     assert torch.equal(asked, SobolSequence(seed=1).points(0, 32 + 30 * 16, 5))
     for width in (16, 64, 512):
         for column in asked.T:
             assert ((column[:512] * width).long().bincount(minlength=width) == 512 // width).all()
+
+
+def test_nothing_is_looked_at_twice_where_batches_are_refused_and_losses_are_not_finite() -> None:
+    batches = [0, 1, 3, 4, 5, 6, 7, 8, 9, 10, 11, 14, 15]
+    asked = looks(looking(uniform_first=32), batches=batches, dimensions=5, lost=math.nan)
+    assert [len(states) for states in asked] == [CHAINS] * 9 + [64] * 4
+    assert len(torch.cat(asked).unique(dim=0)) == 9 * CHAINS + 4 * 64
 
 
 def test_a_sampler_that_looks_needs_somebody_who_tells() -> None:
