@@ -213,11 +213,18 @@ def test_without_averaged_weights_nothing_is_answered_by_them() -> None:
 def test_initial_weights_depend_on_the_seed_alone() -> None:
     def weights(seed: int) -> torch.Tensor:
         torch.rand(7)  # whatever the global generator did before
+        before = torch.random.get_rng_state()
         made = seeded(PixelGenerator, seed=seed)(layout=LAYOUT, scene_dimensions=2)
+        assert torch.equal(torch.random.get_rng_state(), before)
         return made.output_layer.weight
 
-    before = torch.random.get_rng_state()
     assert torch.equal(weights(1), weights(1))
     assert not torch.equal(weights(1), weights(2))
-    torch.rand(7 * 4)
-    torch.random.set_rng_state(before)
+
+
+def test_a_target_of_what_no_network_says_is_refused() -> None:
+    class Brightness(Loss):
+        requires = frozenset({"loss", "brightness"})
+
+    with pytest.raises(ValueError, match=r"Brightness requires \['brightness'\]; known .*'loss'"):
+        module(Brightness())

@@ -8,6 +8,7 @@ import pytest
 import torch
 
 from ngi.learn import Budget, ConstantRate, WarmupStableDecay
+from ngi.models.batched_muon import BatchedMuon
 from ngi.train import train
 from tests.learn.forked import configuration
 from tests.learn.lightning_warnings import IGNORED
@@ -42,11 +43,15 @@ def test_it_rises_stays_and_falls() -> None:
     assert schedule().factor(steps=41, used=1.3) == pytest.approx(0.02)
 
 
-def test_over_the_whole_budget_it_is_pytorchs_cosine() -> None:
+@pytest.mark.parametrize("warmup", [0, 8])
+def test_over_the_whole_budget_it_is_pytorchs_cosine(warmup: int) -> None:
+    """Times the warm-up."""
+    rising = [*((k + 1) / 8 for k in range(warmup)), *[1.0] * (30 - warmup)]
     optimizer = torch.optim.SGD([torch.zeros(1, requires_grad=True)], lr=1.0)
     theirs = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, T_max=30, eta_min=0.02)
-    for found in factors(schedule(warmup_steps=0, decay_share=1.0), 30):
-        assert found == pytest.approx(optimizer.param_groups[0]["lr"])
+    ours = factors(schedule(warmup_steps=warmup, decay_share=1.0), 30)
+    for found, warm in zip(ours, rising, strict=True):
+        assert found == pytest.approx(warm * optimizer.param_groups[0]["lr"])
         optimizer.step()
         theirs.step()
 
@@ -81,27 +86,47 @@ def test_a_schedule_longer_than_the_budget_is_refused() -> None:
     schedule().check(Budget(seconds=1))
 
 
-@pytest.mark.parametrize("optimizer", ["adam", "muon"])
+@pytest.mark.parametrize(
+    ("optimizer", "base"),
+    [
+        (("optimizer=adam", "optimizer.lr=0.002"), {"Adam": 0.002}),
+        (
+            ("optimizer=muon", "optimizer.lr=0.004", "optimizer.adam_lr=0.002"),
+            {"BatchedMuon": 0.004, "Adam": 0.002},
+        ),
+    ],
+    ids=["adam", "muon"],
+)
 def test_every_step_is_taken_at_its_rate_and_the_clocks_share_decides(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, optimizer: str
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    optimizer: tuple[str, ...],
+    base: dict[str, float],
 ) -> None:
-    rates: list[list[float]] = []
-    step = torch.optim.Adam.step
+    rates: dict[str, list[float]] = {}
 
-    def noted(self: torch.optim.Adam, *arguments: Any, **options: Any) -> Any:
-        rates.append([group["lr"] for group in self.param_groups])
-        return step(self, *arguments, **options)
+    def note(rule: type[torch.optim.Optimizer]) -> None:
+        step = rule.step
 
-    monkeypatch.setattr(torch.optim.Adam, "step", noted)
+        def noted(self: torch.optim.Optimizer, *arguments: Any, **options: Any) -> Any:
+            (group,) = self.param_groups
+            rates.setdefault(rule.__name__, []).append(group["lr"])
+            return step(self, *arguments, **options)
+
+        monkeypatch.setattr(rule, "step", noted)
+
+    note(torch.optim.Adam)
+    note(BatchedMuon)
     config = configuration(
         tmp_path,
-        f"optimizer={optimizer}",
+        *optimizer,
         "schedule=warmup_stable_decay",
         "schedule.warmup_steps=4",
         "schedule.decay_share=0.5",
         "evaluation.count=1",
     )
     train(config)
-    base = config.optimizer.get("adam_lr", config.optimizer.lr)
-    of_schedule = [base * factor for factor in factors(schedule(), 40)]
-    assert [rate for (rate,) in rates] == pytest.approx(of_schedule)
+    of_schedule = factors(schedule(), 40)
+    assert rates.keys() == base.keys()
+    for rule, rate in base.items():
+        assert rates[rule] == pytest.approx([rate * factor for factor in of_schedule])

@@ -189,6 +189,14 @@ def test_a_batch_without_feedback_stops_the_stream(tmp_path: Path) -> None:
         next(batches)
 
 
+def test_a_batch_is_answered_once(tmp_path: Path) -> None:
+    stream = make(tmp_path)
+    told = answer(next(iter(stream)))
+    stream.feedback(told)
+    with pytest.raises(RuntimeError, match="feedback without a batch"):
+        stream.feedback(told)
+
+
 def test_a_patch_larger_than_the_image_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"7 pixels a side.*patch of 8"):
         make(tmp_path, schedule=constant_resolution(7))
