@@ -53,3 +53,25 @@ def test_what_looking_takes_is_what_the_runs_say() -> None:
     shares = 100 * small.explore_seconds / small.run_seconds
     expected = f"{shares.min():.1f}", f"{shares.max():.1f}"
     assert said(PAGE, r"Looking took ([\d.]+) to ([\d.]+) % of the time") == expected
+
+
+def test_what_positions_of_corners_had_is_what_their_runs_say() -> None:
+    (uniform, small), corners = ends(), ends_of(FOLDER / "scarce_corners.csv")
+    hard, _, common, _ = zip(*map(errors_of, corners), strict=True)
+    number = r"(\d+\.\d % ± \d+\.\d)"
+    words = rf"it was {number} on hard frames and {number} on uniform ones"
+    assert said(PAGE, words) == tuple(in_words(over_scenes(*pair)) for pair in (hard, common))
+    less = [
+        [in_words(over_scenes(a, b)) for a, b in zip(*map(errors_of, pair), strict=True)]
+        for pair in zip(corners, (uniform, small), strict=True)
+    ]
+    words = rf"{number} less error on hard frames with uniform sampling and {number} with small"
+    assert said(PAGE, words) == (less[0][0], less[1][0])
+    words = rf"than those had, {number} and {number} on uniform ones"
+    assert said(PAGE, words) == (less[0][2], less[1][2])
+    more = [
+        100 * (now.patches_traced / before.patches_traced - 1)
+        for before, now in zip(corners, (uniform, small), strict=True)
+    ]
+    least, most = (f"{limit(map(limit, more)):.0f}" for limit in (min, max))
+    assert said(PAGE, r"which traced (\d+) to (\d+) % more patches") == (least, most)
