@@ -276,12 +276,14 @@ def test_pictures_show_the_tone_mapped_radiance(evaluator, tmp_path) -> None:
 
 
 def test_error_picture_is_fixed_in_scale_and_marks_what_is_not_finite() -> None:
-    reference = torch.full((1, 4, 3), 0.99)
-    prediction = torch.tensor([0.99, 1.4899, 5.0, torch.nan]).view(1, 4, 1).expand(1, 4, 3)
+    reference = torch.full((1, 5, 3), 0.99)
+    prediction = torch.tensor([0.99, 1.4899, 5.0, torch.nan, 0.99]).view(1, 5, 1).repeat(1, 1, 3)
+    prediction[0, 4] += torch.tensor([-0.25, 0.0, 0.503])  # the mean over the channels is 0.251
     picture = error_picture(prediction, reference, epsilon=0.01)[0].tolist()
     assert picture[0] == [0, 0, 3]  # inferno's ends
     assert picture[1] == picture[2] == [252, 254, 164]
     assert picture[3] == [0, 255, 255]
+    assert picture[4] == [187, 55, 84]  # its middle, the 129th of 256 colours
 
 
 def test_evaluation_is_immutable(evaluator) -> None:

@@ -1,10 +1,12 @@
+import dataclasses
+
 import numpy as np
 import pytest
 import torch
 from skimage import color
 from skimage.metrics import structural_similarity
 
-from ngi.evaluate import dssim, mae, mape, non_finite_pixels, relmse, tone_map
+from ngi.evaluate import dssim, image_metrics, mae, mape, non_finite_pixels, relmse, tone_map
 
 SIZES = [(11, 11), (13, 37), (64, 65)]
 
@@ -141,6 +143,46 @@ def test_tone_map_is_the_srgb_curve_of_scikit_image() -> None:
 def test_tone_map_exposes_in_stops_and_clips() -> None:
     radiance = torch.tensor([[-1.0, 0.125, 3.0]])
     assert torch.equal(tone_map(radiance, exposure=1.0), tone_map(torch.tensor([[0.0, 0.25, 1.0]])))
+
+
+class LpipsWithoutWeights:
+    """Stands where LPIPS does, and keeps what it is given."""
+
+    available = True
+    given: tuple[torch.Tensor, torch.Tensor]
+
+    def __call__(self, prediction: torch.Tensor, reference: torch.Tensor) -> float:
+        self.given = prediction, reference
+        return 0.125
+
+
+def test_relative_and_absolute_errors_are_of_radiance_and_the_others_of_pictures(protocol) -> None:
+    """For a sigma of 0.7 scikit-image takes a window of 2 int(3.5 * 0.7 + 0.5) + 1 = 5 pixels."""
+    p, r = (image.double().numpy() for image in images(13, 37))
+    as_here = dataclasses.replace(
+        protocol, epsilon=0.05, exposure=1.0, ssim_window=5, ssim_sigma=0.7
+    )
+    lpips = LpipsWithoutWeights()
+    given = torch.from_numpy(p), torch.from_numpy(r)
+    found = image_metrics(*given, protocol=as_here, lpips=lpips)  # type: ignore[arg-type]
+    exposed = [np.clip(2 * radiance, 0, 1) for radiance in (p, r)]
+    pictures = [
+        np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+        for light in exposed
+    ]
+    ssim = structural_similarity(
+        *pictures,
+        data_range=1.0,
+        channel_axis=-1,
+        gaussian_weights=True,
+        sigma=0.7,
+        use_sample_covariance=False,
+    )
+    assert found["mape"] == pytest.approx(np.mean(abs(p - r) / (r + 0.05)), rel=1e-12)
+    assert found["mae"] == pytest.approx(np.mean(abs(p - r)), rel=1e-12)
+    assert found["dssim"] == pytest.approx((1 - ssim) / 2, abs=1e-9)
+    assert found["lpips"] == 0.125
+    np.testing.assert_allclose(lpips.given, pictures, atol=1e-12)
 
 
 @pytest.mark.parametrize("bad", [float("nan"), float("inf"), -float("inf")])
