@@ -2,10 +2,12 @@ import math
 
 import pytest
 import torch
+from hydra.utils import instantiate
 
 from ngi.models import EncodedGenerator
 from ngi.models.pixel_encoding import PixelEncoding
 from ngi.patches import BUFFER_CHANNELS, BufferLayout, MovingPoints
+from tests.learn.composition import run_config
 
 LAYOUT = BufferLayout()
 STILL = MovingPoints.none(4)
@@ -148,6 +150,26 @@ def test_emission_is_passed_through() -> None:
     assert (output[..., 0] == 1.5).all()
     torch.testing.assert_close(output[..., 1], dark[..., 1] + 0.5)
     torch.testing.assert_close(output[..., 2], dark[..., 2])
+
+
+@pytest.mark.parametrize(
+    ("model", "radiance"),
+    [("encoded_generator", 5.2), ("encoded_generator_emitters_alone", 5.0)],
+)
+def test_direct_light_beside_an_emitter_shows_where_the_model_says_so(
+    model: str, radiance: float
+) -> None:
+    """The network says nothing; direct light is 0.2, emission 5."""
+    config = run_config(f"model={model}", "model.hidden_features=16").model
+    layout = BufferLayout(("position", "normal", "outgoing", "direct", "emission"))
+    network = instantiate(config)(layout=layout, scene_dimensions=4)
+    for parameter in (network.mlp.weights[-1], network.mlp.biases[-1]):
+        torch.nn.init.zeros_(parameter)
+    buffers = make_buffers(6, 7, layout=layout)
+    buffers[..., layout.slice("direct")] = math.log(1.2)
+    buffers[..., layout.slice("emission")] = math.log(6)
+    for output in (network(buffers[None], V)[0], network.render(buffers, V[0])):
+        torch.testing.assert_close(output.expm1(), torch.full((6, 7, 3), radiance))
 
 
 def test_reduced_precision_is_close_and_trains() -> None:
