@@ -147,36 +147,6 @@ def test_nothing_is_compiled_after_warm_up(load_box) -> None:
     assert all(kernel["cache_hit"] for kernel in kernels)
 
 
-def test_image_is_the_mean_of_its_passes(load_box, monkeypatch) -> None:
-    renderer = load_box("llvm", buffer_samples=1, patch_size=16)
-    whole = renderer.render_image(V, resolution=16, samples_per_pixel=512, seed=0)
-    buffers = renderer.image_buffers(V, resolution=16)
-    monkeypatch.setattr("ngi.render.mitsuba_renderer.SAMPLES_PER_PASS", 100)
-    monkeypatch.setattr("ngi.render.tracing.PATHS_PER_LAUNCH", 100 * 16 * 5)
-    passes = renderer.render_image(V, resolution=16, samples_per_pixel=512, seed=0)
-    assert passes.shape == (16, 16, 3)
-    # Away from the lamp, whose edges are the noisiest part of the picture.
-    dark = (buffers[..., renderer.layout.slice("emission")] == 0).all(-1)
-    dark &= whole.amax(-1) < 1
-    a, b = passes[dark].mean(), whole[dark].mean()
-    torch.testing.assert_close(a, b, rtol=0.01, atol=0)
-
-
-def test_buffers_of_an_image_are_the_same_in_bands(load_box, monkeypatch) -> None:
-    renderer = load_box("llvm", buffer_samples=4, patch_size=16)
-    whole = renderer.image_buffers(V, resolution=16)
-    windows = []
-    buffers = renderer._tracer.buffers
-    monkeypatch.setattr(
-        renderer._tracer,
-        "buffers",
-        lambda window, samples: (windows.append(window), buffers(window, samples=samples))[1],
-    )
-    monkeypatch.setattr("ngi.render.tracing.PATHS_PER_LAUNCH", 4 * 16 * 5)
-    torch.testing.assert_close(renderer.image_buffers(V, resolution=16), whole)
-    assert [window.height for window in windows] == [5, 5, 5, 1]
-
-
 def test_scalar_images_follow_the_camera(box_folder) -> None:
     renderer = MitsubaRenderer(
         scene=read_scene(box_folder), backend="scalar", buffer_samples=1, patch_size=16
@@ -192,27 +162,6 @@ def test_scalar_images_follow_the_camera(box_folder) -> None:
     assert (moved - truth).abs().mean() < 0.2 * (still - truth).abs().mean()
     emission = renderer.image_buffers(V, resolution=32)[..., renderer.layout.slice("emission")]
     torch.testing.assert_close((moved > 5).all(-1), (emission > 1).all(-1))
-
-
-def test_many_samples_are_traced_in_passes_that_weigh_by_their_samples(
-    load_box, monkeypatch
-) -> None:
-    renderer = load_box("llvm", buffer_samples=1, patch_size=16)
-    assert renderer.samples_per_pixel == 8
-    monkeypatch.setattr(renderer, "_passes", [3, 3, 2])
-    passes = {}
-
-    def numbered(window, *, samples, seed):
-        passes[seed] = samples
-        image = torch.full((window.height, window.width, 3), float(len(passes)))
-        return lambda: image
-
-    monkeypatch.setattr(renderer._tracer, "radiance", numbered)
-    patches = renderer.render_patches(states(1), resolution=40, seed=0)
-    assert list(passes.values()) == [3, 3, 2]
-    mean = (3 * 1 + 3 * 2 + 2 * 3) / 8
-    torch.testing.assert_close(patches.log_radiance.expm1(), torch.full((1, 16, 16, 3), mean))
-    assert patches.paths == 16 * 16 * 8
 
 
 def test_a_patch_in_halves_is_the_mean_of_two_independent_ones(load_box) -> None:
