@@ -4,8 +4,10 @@ import csv
 import json
 import re
 import shutil
+from collections.abc import Callable
 from math import pi
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -87,6 +89,41 @@ def test_a_frame_is_timed_in_its_parts(runs: Path) -> None:
     assert ms["path tracing"] == pytest.approx(ms["paths"])  # no denoiser, no buffers
     assert ms["network"] == pytest.approx(ms["buffers"] + ms["network alone"])
     assert all(value >= 0 for value in ms.values())
+
+
+@pytest.mark.parametrize(("milliseconds", "samples"), [("null", 12), ("12_500", 6)])
+def test_denoised_frames_are_timed_with_the_buffers_that_guide_them_and_fill_the_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, milliseconds: str, samples: int
+) -> None:
+    """Buffers take 2 s, a sample of all pixels 1 s, the denoiser 4 s, the network alone 16 s."""
+    now = [0.0]
+
+    def taking(function: Callable[..., Any], seconds: float) -> Callable[..., Any]:
+        def slow(*arguments: Any, **options: Any) -> Any:
+            now[0] += seconds * options.get("samples_per_pixel", 1)
+            return function(*arguments, **options)
+
+        return slow
+
+    clock = SimpleNamespace(perf_counter=lambda: now[0])
+    monkeypatch.setattr("ngi.machine.timing.time", clock)
+    for name, seconds in (("image_buffers", 2.0), ("render_image", 1.0)):
+        slow = taking(getattr(AnalyticRenderer, name), seconds)
+        monkeypatch.setattr(AnalyticRenderer, name, slow)
+    monkeypatch.setattr("ngi.methods.path_tracing.run.show", taking(show, 16.0))
+    keep = taking(lambda radiance, *_: radiance, 4.0)
+    monkeypatch.setattr("ngi.denoise.OpenImageDenoise", lambda: keep)
+    time = f"path_tracing.milliseconds={milliseconds}"
+    frame = run(tmp_path, "run", "method=path_tracing_oidn", time)["frame"]
+    assert frame["samples_per_pixel"] == samples
+    assert frame["milliseconds"] == {
+        "buffers": 2000,
+        "paths": 1000 * samples,
+        "denoiser": 4000,
+        "network alone": 16_000,
+        "path tracing": 2000 + 1000 * samples + 4000,
+        "network": 18_000,
+    }
 
 
 def test_the_network_beside_it_is_the_one_that_would_be_trained(
