@@ -8,6 +8,7 @@ from torch import Tensor
 
 from ngi.methods.anf import Sequences
 from ngi.methods.anf.affinity import warped
+from ngi.methods.anf.sequences import TEST_SEED
 from ngi.patches import Patches
 from ngi.render import AnalyticRenderer
 from tests.learn.moving_camera import MovingCamera
@@ -51,6 +52,16 @@ def rendered(
 
 def states(count: int = 3) -> Tensor:
     return torch.rand(count, 2 * 4 + 2, generator=torch.Generator().manual_seed(1))
+
+
+def assert_shown_before(
+    buffers: Tensor, sources: Tensor, samples: Sequences, *, resolution: int
+) -> None:
+    """What a pixel shows lay within half a pixel of its source, in the frame before."""
+    position = buffers[..., samples.layout.slice("position")].movedim(-1, 1)
+    there, found = warped(position[:-1], sources)
+    apart = ((there - position[1:]) * found).abs().max()
+    assert apart <= 0.5 * 0.5 / resolution + 1e-6  # of half a unit
 
 
 def test_a_path_is_a_line_within_the_hypercube() -> None:
@@ -108,25 +119,29 @@ def test_a_frame_before_is_found_by_its_camera() -> None:
     assert set(shift[known].tolist()) <= {1, 2}
     assert known.float().mean() > 0.85
     assert not known[:, -1].any()
-    position = buffers[:, :, ..., samples.layout.slice("position")].movedim(-1, 2)
-    for frame in range(1, FRAMES):
-        there, found = warped(position[:, frame - 1], sources[:, frame - 1])
-        apart = ((there - position[:, frame]) * found).abs().max()
-        assert apart <= 0.5 * 0.5 / RESOLUTION + 1e-6  # half a pixel, of half a unit
+    assert_shown_before(buffers[0], sources[0], samples, resolution=RESOLUTION)
 
 
 def test_test_frames_are_led_to_and_are_themselves_the_last() -> None:
-    samples = sequences()
-    v = torch.tensor([0.2, 0.4, 0.6, 0.8])
+    """By frames of the same v each: their noisy pictures, their buffers and their cameras."""
+    samples = sequences(reach=0.3)
+    v = torch.tensor([0.4, 0.4, 0.6, 0.6])
     renderer = Walking(patch_size=PATCH)
     buffers = renderer.image_buffers(v, resolution=24)
     noisy, earlier, sources = samples.test_inputs(v, buffers)
     assert noisy.shape == (FRAMES, 24, 24, 3)
     assert earlier.shape == (FRAMES - 1, 24, 24, samples.layout.channels)
     assert sources.shape == (FRAMES - 1, 24, 24)
-    _, clean = renderer.whole_image(v, 24)
-    torch.testing.assert_close(torch.expm1(noisy[-1]), clean)
-    assert not torch.allclose(noisy[0], noisy[-1])
+    back = torch.rand(4, generator=torch.Generator().manual_seed(TEST_SEED))
+    path = [v + time * 0.3 * (2 * back - 1) for time in (1, 2 / 3, 1 / 3, 0)]
+    for frame, there in enumerate(path):
+        at_frame, clean = renderer.whole_image(there, 24)
+        torch.testing.assert_close(torch.expm1(noisy[frame]), clean)
+        if frame < FRAMES - 1:
+            torch.testing.assert_close(earlier[frame], at_frame)
+    assert (sources >= 0).float().mean() > 0.7
+    of_path = torch.cat([earlier, buffers[None]])
+    assert_shown_before(of_path, sources, samples, resolution=24)
     again = samples.test_inputs(v, buffers)
     assert all(torch.equal(a, b) for a, b in zip((noisy, earlier, sources), again, strict=True))
 
