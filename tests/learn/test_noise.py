@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 import torch
-from scipy import ndimage
+from scipy import ndimage, stats
 from torch import Tensor
 
 from ngi.explore import Importance, PredictedLoss
@@ -21,6 +21,7 @@ from tests.learn.small_stream import make
 from tests.learn.test_step import module
 
 COUNT = 200
+BOTH: SampleLoss = L1Dssim(l1_weight=1.0, dssim_weight=1.0, window_size=7)
 
 
 def renderer(noise: float, *, halves: bool = False) -> PocketRenderer:
@@ -102,14 +103,39 @@ def test_squared_errors_without_noise_have_no_bias(offset: float) -> None:
 
 
 @pytest.mark.parametrize("noise", [0.3, 1.0])
-@pytest.mark.parametrize("offset", [0.0, 0.05, 0.2, 0.8])
-def test_losses_without_noise_are_closer_to_those_of_the_truth(noise: float, offset: float) -> None:
-    loss: SampleLoss = L1Dssim(l1_weight=1.0, dssim_weight=1.0, window_size=7)
+def test_the_noise_is_what_the_truth_would_lose_or_a_little_more(noise: float) -> None:
     batch, truth = rendered(noise)
-    without = loss(truth + offset, truth)
-    measured = loss(truth + offset, batch.patches.log_radiance)
-    corrected = without_noise(measured, noise_loss(loss, batch))
-    assert (corrected - without).mean().abs() < 0.75 * (measured - without).mean().abs()
+    lost = BOTH(truth, batch.patches.log_radiance).mean().item()
+    assert lost < noise_loss(BOTH, batch).mean().item() < 1.08 * lost
+
+
+@pytest.mark.parametrize(
+    ("noise", "offset", "left"),
+    [
+        *((0.3, 0.0, 0.1), (0.3, 0.05, 0.15), (0.3, 0.2, 0.45), (0.3, 0.8, 0.75)),
+        *((1.0, 0.0, 0.1), (1.0, 0.05, 0.1), (1.0, 0.2, 0.1), (1.0, 0.8, 0.5)),
+    ],
+)
+def test_losses_without_noise_are_closer_to_those_of_the_truth(
+    noise: float, offset: float, left: float
+) -> None:
+    """left: of what noise adds, at most; the larger the error, the less it adds"""
+    batch, truth = rendered(noise)
+    without = BOTH(truth + offset, truth)
+    measured = BOTH(truth + offset, batch.patches.log_radiance)
+    corrected = without_noise(measured, noise_loss(BOTH, batch))
+    assert (corrected - without).mean().abs() < left * (measured - without).mean().abs()
+
+
+@pytest.mark.parametrize(
+    ("error", "apart"), [(0.0, 1e-6), (0.5, 0.17), (1.5, 0.17), (5.0, 0.07), (20.0, 0.02)]
+)
+def test_a_mean_absolute_error_is_right_where_it_is_none_or_far_above_the_noise(
+    error: float, apart: float
+) -> None:
+    """Under Gaussian noise of the deviation 1 it has the mean of a folded normal distribution."""
+    measured, noise = (torch.tensor([stats.foldnorm.mean(d)]) for d in (error, 0.0))
+    assert without_noise(measured, noise).item() == pytest.approx(error, abs=apart)
 
 
 @pytest.mark.parametrize(("side", "window"), [(8, 5), (3, 3), (1, 1)])
