@@ -67,7 +67,10 @@ def test_weights_undo_the_density_and_are_bounded() -> None:
 
 @pytest.mark.parametrize(("share", "count"), [(0.5, 16), (0.1, 16), (0.1, 64), (0.2, 1)])
 def test_the_weighted_mean_of_draws_is_that_of_all_candidates(share: float, count: int) -> None:
-    """Of the rare ones, which most draws are of, and of the others."""
+    """Of the rare ones, which most draws are of, and of the others.
+
+    Independent draws would have a variance of (Σ 1 / (m² p_i) - (Σ 1 / m)²) / count.
+    """
     values = torch.ones(512)
     values[:16] = 100.0
     importance = Importance(uniform_share=share, weighted=True)
@@ -77,10 +80,13 @@ def test_the_weighted_mean_of_draws_is_that_of_all_candidates(share: float, coun
         drawn, weights = importance.draw(values, count, generator)
         rare.append((weights * (drawn < 16)).sum().item() / count)
         common.append((weights * (drawn >= 16)).sum().item() / count)
-    for found, expected in ((rare, 16 / 512), (common, 496 / 512)):
-        error = np.std(found, ddof=1) / len(found) ** 0.5
-        assert abs(np.mean(found) - expected) < 4 * error
-        assert error < 0.06
+    density = importance.probabilities(values).numpy()
+    for found, p in ((rare, density[:16]), (common, density[16:])):
+        expected = len(p) / 512
+        independent = ((1 / (512**2 * p)).sum() - expected**2) / count
+        variance = np.var(found, ddof=1)
+        assert abs(np.mean(found) - expected) < 4 * (variance / len(found)) ** 0.5
+        assert variance < 3 * independent
 
 
 def test_uniform_draws_all_count_the_same() -> None:
