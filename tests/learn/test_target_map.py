@@ -10,7 +10,7 @@ from torch import Tensor
 
 from ngi.explore import Loss, Signals, Target
 from ngi.learn import STREAM, PatchSamples, TargetMap
-from ngi.learn.target_map import map_states
+from ngi.learn.target_map import PATCHES_AT_ONCE, map_states
 from ngi.models import L1Dssim, PixelGenerator
 from ngi.patches import Patches
 from ngi.render import AnalyticRenderer
@@ -23,14 +23,19 @@ CELLS, POSITIONS = 3, 2
 
 
 def target_map(
-    cells: int = CELLS, positions: int = POSITIONS, dimensions: int = 2, **options: Any
+    cells: int = CELLS,
+    positions: int = POSITIONS,
+    dimensions: int = 2,
+    noise: float = 0.0,
+    **options: Any,
 ) -> TargetMap:
+    renderer = AnalyticRenderer(dimensions=dimensions, patch_size=16, noise=noise)
     return TargetMap(
         cells=cells,
         positions_per_cell=positions,
         target=Loss(),
         resolution=32,
-        samples=PatchSamples(renderer=AnalyticRenderer(dimensions=dimensions, patch_size=16)),
+        samples=PatchSamples(renderer=renderer),
         **options,
     )
 
@@ -79,6 +84,23 @@ def test_patches_are_rendered_once_and_no_global_state_is_touched(
     first = made.measure()
     np.testing.assert_array_equal(made.measure()["loss"], first["loss"])
     assert torch.equal(torch.random.get_rng_state(), before)
+
+
+def test_all_runs_have_the_same_noise_and_each_chunk_its_own() -> None:
+    """The seed of a chunk's rendering is its number."""
+    rendered: list[Tensor] = []
+
+    def keep(patches: Patches, _: Target) -> Signals:
+        rendered.append(patches.log_radiance)
+        return Signals(torch.zeros(len(patches.scene_vector)))
+
+    target_map(cells=4, positions=3, noise=0.1, signals=keep).measure()
+    renderer = AnalyticRenderer(dimensions=2, patch_size=16, noise=0.1)
+    chunks = map_states(4, 3).flatten(0, 2).split(PATCHES_AT_ONCE)
+    assert len(rendered) == len(chunks) == 3
+    for seed, (found, states) in enumerate(zip(rendered, chunks, strict=True)):
+        expected = renderer.render_patches(states, resolution=32, seed=seed).log_radiance
+        torch.testing.assert_close(found, expected, rtol=2**-11, atol=2**-25)  # half precision
 
 
 @pytest.mark.parametrize(
