@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ngi.scene.release import read_release
-from tests.scene.release_files import BALL, PATH, ROOM, SENSOR, read, tags, write
+from tests.scene.release_files import BALL, GROUP, PATH, ROOM, SENSOR, read, tags, write
 
 LAMP = f'<emitter type="point" id="var_lamp">{tags(1)}</emitter>'
 FIRST_LINE = 9
@@ -106,6 +106,10 @@ def test_name_frames_and_hash(tmp_path) -> None:
     assert read_release(folder).scene_hash != description.scene_hash
 
 
+CHEQUERED = """<bsdf type="diffuse" id="var_m">
+<texture type="checkerboard" name="reflectance"/>{}</bsdf>"""
+VARIED_GROUP = f'<shape type="shapegroup" id="var_g">{BALL}{{}}</shape>'
+INSTANCE = '<shape type="instance"><ref id="g"/></shape>'
 VARIED = '<shape type="sphere" id="var_b">\n{}</shape>'
 
 
@@ -124,12 +128,23 @@ VARIED = '<shape type="sphere" id="var_b">\n{}</shape>'
         (f'\n<emitter type="point" id="var_e">{tags(2)}</emitter>', 2, ["3 is radiance", "1 "]),
         (f'\n<emitter type="envmap" id="var_e">{tags(3)}</emitter>', 2, ["turns"]),
         ('\n<emitter type="sunsky" id="var_e"/>', 2, ["sunsky", "point", "envmap"]),
-        ('\n<emitter type="area" id="var_e"/>', 2, ["no shape"]),
+        ('\n<emitter type="area" id="var_e"/>', 2, ["to this area emitter; give one"]),
         (f'\n<bsdf type="diffuse" id="var_m">{tags(2)}</bsdf>', 2, ["colour", "roughness"]),
         ('\n<bsdf type="null" id="var_m"/>', 2, ["null", "roughconductor"]),
         ('\n<texture type="bitmap" id="var_t"/>', 2, ["<texture", "<shape>"]),
         (f'<shape type="shapegroup" id="g">\n{VARIED.format("")}</shape>', 2, ["instance"]),
-        ('\n<shape type="instance" id="var_b"><ref id="nowhere"/></shape>', 2, ["nowhere"]),
+        (f"\n{CHEQUERED.format(tags(3))}", 2, ["factor on bitmaps, not on a 'checkerboard'"]),
+        (f"\n{CHEQUERED.format(tags(1))}", 2, ["no shape has a <ref> to it; give one"]),
+        (
+            '\n<shape type="instance" id="var_b"><ref id="nowhere"/></shape>',
+            2,
+            ["one <ref> to a", "nowhere"],
+        ),
+        (f'{GROUP}\n<shape type="instance"/>', 2, ["one <ref> to a shapegroup"]),
+        (f'<shape type="shapegroup" id="g">\n{INSTANCE}</shape>{INSTANCE}', 2, ["cannot be part"]),
+        (f"\n{VARIED_GROUP.format(tags(2))}", 2, ["num_parameters is 2; a group has 1"]),
+        (f"\n{VARIED_GROUP.format(tags(1))}", 2, ["0 instances; a group that varies has one"]),
+        ('\n<shape type="ply"/>', 2, ["names no file", "filename"]),
         ('\n<shape type="bagel"/>', 2, ["bagel", "sphere"]),
         ('\n<bsdf type="diffuse"><vector4f name="k" value="1, 1, 1, 1"/></bsdf>', 2, ["tags"]),
         (ROOM.replace("<scale", "\n<squash"), 2, ["squash", "translate"]),

@@ -144,6 +144,18 @@ def test_the_colour_is_a_factor_on_linear_light_where_the_texture_has_8_bits(tmp
         assert_allclose(albedo(loaded, *colour), linear * np.array(colour), atol=1e-6)
 
 
+def test_grey_values_are_not_tinted(tmp_path) -> None:
+    mi.Bitmap(np.full((4, 4), 188, dtype=np.uint8)).write(str(tmp_path / "grey.png"))
+    texture = (
+        '<texture type="bitmap" name="reflectance"><string name="filename" value="grey.png"/>'
+        "</texture>"
+    )
+    description = read(tmp_path, WALL.format("diffuse", texture + tags(3)))
+    said = r"scene\.xml: var_paint\.tint: 'var_paint': a bitmap of grey values .* three channels"
+    with pytest.raises(ValueError, match=said):
+        Loaded(description)
+
+
 def test_a_texture_that_others_refer_to_keeps_its_colour_there(tmp_path) -> None:
     write_exr(tmp_path / "grey.exr", torch.full((4, 4, 3), 0.5))
     shared = '<texture type="bitmap" id="grey"><string name="filename" value="grey.exr"/></texture>'

@@ -40,7 +40,10 @@ class Tint(RangedVariable):
         )
         bitmap = scene.bitmap(key)
         if bitmap.shape[2] != 3:
-            raise ValueError(f"'{object_id}': a bitmap of grey values cannot be tinted")
+            raise ValueError(
+                f"'{object_id}': a bitmap of grey values cannot be tinted; save it with three "
+                "channels"
+            )
         authored = scene.read(key).astype(np.float32)
         return lambda colour: scene.write(key, np.multiply(authored, colour, dtype=np.float32))
 

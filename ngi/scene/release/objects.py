@@ -96,7 +96,8 @@ def place_emitters(objects: Objects) -> None:
         if shapes:
             objects.root.remove(emitter)
         elif emitter.get("type") == "area":
-            raise objects.source.error(emitter, "no shape has a <ref> to this area emitter")
+            message = "no shape has a <ref> to this area emitter; give one to a shape"
+            raise objects.source.error(emitter, message)
 
 
 def separate_emitters(objects: Objects) -> None:

@@ -71,7 +71,9 @@ def _colour(objects: Objects, bsdf: Element, tags: Tags) -> Variable:
     if any(texture is not None for textures in textured for texture in textures):
         for texture in (texture for textures in textured for texture in textures):
             if texture is None or texture.get("type") != "bitmap":
-                raise objects.source.error(bsdf, "its colour can only be a factor on bitmaps")
+                kind = "plain colour" if texture is None else texture.get("type")
+                message = f"its colour can only be a factor on bitmaps, not on a '{kind}'"
+                raise objects.source.error(bsdf, f"{message}; give it a bitmap or an <rgb>")
         for inner, elements in zip(inners, given, strict=True):
             for element in elements:
                 _make_floating(_own(objects, inner, element))
@@ -128,7 +130,7 @@ def _choice(objects: Objects, bsdf: Element) -> Material:
         if any(ref.get("id") == name for ref in shape.findall("ref"))
     ]
     if not shapes:
-        raise objects.source.error(bsdf, "no shape has a <ref> to it")
+        raise objects.source.error(bsdf, "no shape has a <ref> to it; give one to a shape")
     return Material(tuple(shapes), objects.ids(name))
 
 
