@@ -62,9 +62,16 @@ def test_the_report_is_written_and_a_failure_is_the_exit_status(
     assert "OverflowError" in (tmp_path / "stability_part.md").read_text()
 
 
-@pytest.mark.parametrize("arguments", [["nothing"], ["reuse", "matching=nothing"]])
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["nothing"], "no group nothing; there are "),
+        (["reuse", "matching=nothing"], "no case has 'nothing' in its name; there are "),
+    ],
+)
 def test_what_is_not_there_is_named(
-    arguments: list[str], capsys: pytest.CaptureFixture[str], tmp_path: Path
+    arguments: list[str], said: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     assert main([*arguments, f"output={tmp_path}"]) == 2
-    assert "nothing" in capsys.readouterr().err
+    assert said in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
