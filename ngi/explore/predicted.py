@@ -105,8 +105,8 @@ class PredictedLoss:
         if numbers > MOST_NUMBERS:
             raise ValueError(
                 f"sampler.memory: {self._forest['trees']} trees of {self._memory} states with "
-                f"{state_dimensions} variables are {numbers:.1g} numbers, several times; give less "
-                "of sampler.memory or sampler.trees, or choose sampler=sobol"
+                f"{state_dimensions} variables take several times {4e-9 * numbers:.1f} GB of "
+                "memory; give less of sampler.memory or sampler.trees, or choose sampler=sobol"
             )
         forest = Forest.flat(trees=self._forest["trees"], depth=self._forest["depth"])
         return PredictedState.empty(

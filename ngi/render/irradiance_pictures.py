@@ -127,9 +127,8 @@ def _resolved(sums: list[mi.Float], unit: mi.Float) -> mi.Float:
         mean = dr.mean(mi.Color3f(total))
         # What is expected of this level: chosen by what it has, too much light would be found.
         enough = 1 if level == LEVELS - 1 else dr.clip(2 * photons / ENOUGH_PHOTONS - 1, 0, 1)
-        photons = dr.square(mean) / dr.maximum(
-            squares, _RESOLUTION_OF_SQUARES
-        )  # as in four finer cells
+        squares = dr.maximum(squares, _RESOLUTION_OF_SQUARES)
+        photons = dr.square(mean) / squares  # as in four finer cells
         light = dr.lerp(light, mi.Color3f(total) / 4**level, enough)
         depth = dr.select(mean > 0, deep / mean, depth)
     packed = dr.zeros(mi.Float, 4 * 6 * CELLS * CELLS)

@@ -194,8 +194,10 @@ def of_centres(states: Tensor, *, patch_size: int, resolution: int) -> Tensor:
     Of positions drawn uniformly, `patch_window` alone has few patches reach the image's border: of
     patches of 32 pixels in an image of 96, a pixel in a corner is in 1/469 as many as the mean
     pixel. Here a position (x, y) in [0, 1]^2 is the centre of a patch anywhere in the image,
-    which is moved into it: no pixel is in less than a quarter as many as the mean one.
+    which is moved into it: no pixel is in less than a quarter as many as the mean one. Raises
+    ValueError for states that are not in [0, 1].
     """
+    check_states(states, states.shape[1] - 2)
     last = resolution - patch_size
     centres = (states[:, -2:].double() * (resolution + 1)).floor()
     corners = (centres - patch_size // 2).clamp(0, last)

@@ -58,6 +58,12 @@ def test_positions_at_the_limits_are_in_the_image() -> None:
     assert [(window.x, window.y) for window in windows] == [(0, 8), (8, 0)]
 
 
+def test_positions_outside_the_image_are_refused() -> None:
+    for position in (1.1, -0.1, float("nan")):
+        with pytest.raises(ValueError, match=r"states\[0, 1\] is .*; expected 0 to 1"):
+            of_centres(torch.tensor([[0.5, position, 0.5]]), patch_size=4, resolution=12)
+
+
 def test_seeds_depend_on_every_part_and_their_limits() -> None:
     seeds = {derive_seed(1, b"ab", 2), derive_seed(2, b"ab", 2), derive_seed(1, b"a", 2)}
     seeds |= {derive_seed(1, b"ab", 3), derive_seed(1, b"a", b"b2"), derive_seed(12, b"ab")}
