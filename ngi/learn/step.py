@@ -142,9 +142,12 @@ def _passes(
 ) -> Queued:
     """Leaves the gradient of the step of this number."""
     losses, loss, scores = _backward(batch, learner, optimizer, precision)
-    with learner.stream.clock.phase("score"):
-        asked = () if scores is None else (scores[0](), scores[1])
-        noise = () if batch.first_half is None else (noise_loss(learner.loss, batch),)
+    asked: tuple[Tensor, ...] = ()
+    noise: tuple[Tensor, ...] = ()
+    if scores is not None or batch.first_half is not None:
+        with learner.stream.clock.phase("score"):
+            asked = () if scores is None else (scores[0](), scores[1])
+            noise = () if batch.first_half is None else (noise_loss(learner.loss, batch),)
     norms = gradient_norm(learner.network), largest_moment(optimizer)
     reading = Reading(losses, loss, *norms, *noise, *asked)
 

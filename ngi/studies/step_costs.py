@@ -154,5 +154,7 @@ def step_seconds(rounds: Iterable[list[TimedStep]]) -> dict[str, Seconds]:
             exploring[phase].append(max(0.0, more))
         if further:
             scoring["score"].append(max(0.0, further[0].own - generated.own))
+    if not any(exploring["score"]):
+        del exploring["score"]
     measured = {"training": training, "exploring": exploring}
     return {**measured, "scoring": scoring} if scoring["score"] else measured

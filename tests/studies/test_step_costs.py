@@ -18,7 +18,7 @@ def test_costs_are_differences_between_kinds_of_steps() -> None:
     measured = step_seconds([[GENERATED, REUSED, SCORED, SECOND_REUSED]])
     assert measured == {
         "training": {"reuse": [3.0], "train": [12.0], "other": [3.0]},
-        "exploring": {"explore": [3.0], "reuse": [2.0], "score": [0.0]},
+        "exploring": {"explore": [3.0], "reuse": [2.0]},
         "scoring": {"score": [(1 + 9 + 12 + 30) - (1 + 6 + 10)]},
     }
 
