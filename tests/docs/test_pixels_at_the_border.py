@@ -10,6 +10,7 @@ from analysis.runs import METRICS
 from ngi.files.resources import root
 from tests.docs.pages import ROOT
 from tests.docs.tables import over_scenes, rows_of, tenths
+from tests.docs.test_figures import said
 
 PAGE, SECTION = "docs/learner/README.md", "Pixels at the border"
 RINGS = ["ring_0_5", "ring_5_16", "ring_16_32", "ring_32_48"]
@@ -25,13 +26,19 @@ def test_the_table_is_of_every_run() -> None:
     runs = pd.read_csv(root() / "docs/learner/centred.csv")
     for frames in ("hard", "uniform"):
         runs[frames] = np.exp(np.log(runs[[f"{frames}_{m}" for m in METRICS]]).mean(axis=1))
-    of = runs.set_index(["centred", "scene", "seed"]).sort_index()
+    of = runs.set_index(["centred", "scene", "run"]).sort_index()[COLUMNS]
     corners, centres = of.loc[False], of.loc[True]
-    rows = rows_of(PAGE, SECTION)[2:7]
-    changes = (centres / corners - 1)[COLUMNS]
-    assert rows[:-1] == [[tenths(change) for change in each] for each in changes.to_numpy()]
+    rows = iter(rows_of(PAGE, SECTION)[2:])
+    for _, changes in (centres / corners - 1).groupby("scene"):
+        assert next(rows) == [str(len(changes)), *map(tenths, changes.mean())]
     means = [over_scenes(corners[column], centres[column]) for column in COLUMNS]
-    assert rows[-1] == [f"{tenths(each.mean)} ± {100 * each.half_width:.1f}" for each in means]
+    shown = [f"{tenths(each.mean)} ± {100 * each.half_width:.1f}" for each in means]
+    assert next(rows) == ["", *shown]
+    less = [text.lstrip("−").replace(" ±", " % ±") for text in shown]
+    number = r"(\d+\.\d % ± \d+\.\d)"
+    uniform = rf"{number} less error on uniform frames"
+    assert said(PAGE, rf"{uniform}, {number} less MAPE, and as much") == tuple(less[2:4])
+    assert said("CHANGELOG.md", rf"{uniform} of seven scenes, as much on hard") == (less[2],)
 
 
 def covered(resolution: int, patch_size: int, *, centred: bool) -> np.ndarray:
