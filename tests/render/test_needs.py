@@ -11,6 +11,7 @@ from ngi.render.mitsuba_renderer import MitsubaRenderer
 from ngi.render.needs import buffer_needs, buffers_are_static, needed_layout
 from ngi.scene import read_scene
 from ngi.scene.variable_scene import VariableScene
+from tests.render.box import windows_of_buffers
 
 SCENE = """<scene version="3.0.0">
 <integrator type="path"><integer name="max_depth" value="3"/></integrator>
@@ -120,13 +121,7 @@ def test_same_patches_as_with_everything(scene, backend, monkeypatch) -> None:
     assert everything.layout.names == tuple(BUFFER_CHANNELS)
     states = torch.rand(3, 3, generator=torch.Generator().manual_seed(1))
     expected = everything.render_patches(states, resolution=20, seed=4)
-    traced = []
-    buffers = needed._tracer.buffers
-    monkeypatch.setattr(
-        needed._tracer,
-        "buffers",
-        lambda window, samples: (traced.append(window), buffers(window, samples=samples))[1],
-    )
+    traced = windows_of_buffers(needed, monkeypatch)
     for _ in range(2):
         patches = needed.render_patches(states, resolution=20, seed=4)
     assert len(traced) == 1

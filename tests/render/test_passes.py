@@ -3,7 +3,7 @@
 import numpy as np
 import torch
 
-from tests.render.box import V, states
+from tests.render.box import V, states, windows_of_buffers
 
 
 def test_image_is_the_mean_of_its_passes(load_box, monkeypatch) -> None:
@@ -38,13 +38,7 @@ def test_image_is_the_mean_of_its_passes(load_box, monkeypatch) -> None:
 def test_buffers_of_an_image_are_the_same_in_bands(load_box, monkeypatch) -> None:
     renderer = load_box("llvm", buffer_samples=4, patch_size=16)
     whole = renderer.image_buffers(V, resolution=16)
-    windows = []
-    buffers = renderer._tracer.buffers
-    monkeypatch.setattr(
-        renderer._tracer,
-        "buffers",
-        lambda window, samples: (windows.append(window), buffers(window, samples=samples))[1],
-    )
+    windows = windows_of_buffers(renderer, monkeypatch)
     monkeypatch.setattr("ngi.render.tracing.PATHS_PER_LAUNCH", 4 * 16 * 5)
     torch.testing.assert_close(renderer.image_buffers(V, resolution=16), whole)
     assert [window.height for window in windows] == [5, 5, 5, 1]

@@ -4,14 +4,16 @@ from dataclasses import replace
 
 import pytest
 import torch
+from hydra.utils import instantiate
 
-from ngi.evaluate.protocol import EvaluationProtocol, _spread
+from ngi.evaluate import evaluation_frames
 from ngi.explore import Proposals
 from ngi.learn.ahead import ProposalsAhead
 from ngi.methods.cnsr import ObservationSets
 from ngi.patches import Patches
 from ngi.render import AnalyticRenderer
 from ngi.reuse import CompactPatches
+from tests.learn.composition import run_config
 from tests.learn.moving_camera import SCENE_VARIABLES, MovingCamera
 
 SIZE, OBSERVATIONS = 12, 3
@@ -128,9 +130,10 @@ def test_a_test_frame_is_observed_in_its_own_scene_always_from_the_same_cameras(
         assert torch.equal(a, b)
 
 
-def test_no_test_frame_is_observed_from_its_own_camera(samples) -> None:
+def test_no_test_frame_is_observed_from_its_own_camera(samples, renderer) -> None:
     """Sobol sequences of one seed begin with the same point, however many dimensions they have."""
-    frames = _spread(8, D, seed=EvaluationProtocol.sobol_seed)
+    tested = evaluation_frames(renderer, instantiate(run_config().evaluation.evaluator.protocol))
+    frames = torch.stack([frame.scene_vector for frame in tested if frame.set == "uniform"])
     observed_from = 2 * (samples.test_inputs(frames[0], torch.zeros(48, 48, 1))[2][:, :2] - 0.25)
     for first in range(D - 1):  # wherever in v the camera is
         assert torch.cdist(observed_from, frames[:, first : first + 2]).min() > 1e-3
