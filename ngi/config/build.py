@@ -120,7 +120,16 @@ def build_run(
     stream = build_stream(
         config, renderer=renderer, samples=samples, clock=clock, patches=folder.patches
     )
-    costs = folder.settings["costs"]
+    run_clock: learn.RunClock = clock
+    if (costs := folder.settings["costs"]) is not None:
+        run_clock = learn.ModelClock(costs=costs, counters=lambda: stream.counters)
+    if stored_alone := stream.policy.stored_alone:
+        stream.progress = learn.Progress(
+            budget=budget,
+            clock=run_clock,
+            counters=lambda: stream.counters,
+            stored_alone=stored_alone,
+        )
     return learn.Run(
         folder=folder,
         tracker=tracker,
@@ -131,9 +140,7 @@ def build_run(
         samples=samples,
         stream=stream,
         module=build_module(config, samples=samples, stream=stream, folder=folder.path),
-        run_clock=clock
-        if costs is None
-        else learn.ModelClock(costs=costs, counters=lambda: stream.counters),
+        run_clock=run_clock,
     )
 
 

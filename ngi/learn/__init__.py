@@ -3,7 +3,8 @@
 from ngi.clock.budget import Budget
 from ngi.clock.costs import Component, CostFile, Costs, components
 from ngi.clock.model_clock import ModelClock
-from ngi.clock.phase_clock import PhaseClock
+from ngi.clock.phase_clock import PhaseClock, RunClock
+from ngi.clock.progress import Progress
 from ngi.files.run_folder import RunFolder
 from ngi.learn.batch import Batch, Feedback
 from ngi.learn.callbacks import StepLog, callbacks
@@ -58,8 +59,10 @@ __all__ = [
     "Outcome",
     "PatchSamples",
     "PhaseClock",
+    "Progress",
     "Recorder",
     "Run",
+    "RunClock",
     "RunFolder",
     "Samples",
     "Schedule",

@@ -45,4 +45,4 @@ class LearningRate(Callback):
 
     def _set(self) -> None:
         steps = self._run.stream.counters.iteration
-        self._base.scale(self._run.schedule.factor(steps=steps, used=self._run.budget_used))
+        self._base.scale(self._run.schedule.factor(steps=steps, used=self._run.schedule_used))

@@ -43,3 +43,19 @@ class Run:
         return self.budget.fraction(
             steps=self.stream.counters.iteration, run_seconds=self.run_clock.run_seconds
         )
+
+    @property
+    def schedule_used(self) -> float:
+        """What `schedule` goes by: the same, or of steps where the last are on stored patches.
+
+        Of seconds these take up far less than of steps.
+        """
+        progress = self.stream.progress
+        return self.budget_used if progress is None else progress.share()
+
+    @property
+    def nears_its_end(self) -> bool:
+        """Whether steps depend on how long the run is to be: before, a longer one is the same."""
+        progress = self.stream.progress
+        alone = progress is not None and progress.too_late
+        return alone or self.schedule.decays(self.schedule_used)

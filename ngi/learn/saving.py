@@ -47,7 +47,7 @@ class BudgetAndCheckpoint(Callback):
         self._every_steps = every_steps
         self._saved_at = 0.0
         self._saved_step = 0
-        self._decays_from: int | None = None  # the step after which the schedule's decay began
+        self._decays_from: int | None = None  # the step after which a longer run would differ
         self._bar: tqdm[Any] | None = None
         self._loss = math.nan  # the latest that is known
 
@@ -56,7 +56,7 @@ class BudgetAndCheckpoint(Callback):
         trainer.should_stop = used >= 1  # killed after its last step, before its result
         self._saved_at = self._run.clock.run_seconds
         self._saved_step = self._run.stream.counters.iteration
-        self._go_on_decaying(used)
+        self._go_on_decaying()
         self._bar = tqdm(
             total=100,
             initial=100 * min(used, 1.0),
@@ -73,7 +73,7 @@ class BudgetAndCheckpoint(Callback):
         outputs["step"].when_known(self._know)
         self._show(min(used, 1.0))
         periodic = self._every_steps is not None and steps % self._every_steps == 0
-        decay_begins = self._decays_from is None and self._run.schedule.decays(used)
+        decay_begins = self._decays_from is None and self._run.nears_its_end
         if decay_begins:
             self._decays_from = steps
         due = periodic or seconds - self._saved_at >= self._every_seconds
@@ -117,10 +117,10 @@ class BudgetAndCheckpoint(Callback):
     def load_state_dict(self, state_dict: dict[str, Any]) -> None:
         self._decays_from = state_dict[DECAYS_FROM]
 
-    def _go_on_decaying(self, used: float) -> None:
+    def _go_on_decaying(self) -> None:
         """What a resumed run has to know of the checkpoint before its decay."""
         step, stable = self._run.stream.counters.iteration, self._run.folder.stable_checkpoint
-        if not self._run.schedule.decays(used):
+        if not self._run.nears_its_end:
             self._decays_from = None  # it is trained longer
         elif step == 0:
             self._decays_from = 0

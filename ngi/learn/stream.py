@@ -18,6 +18,7 @@ import torch
 
 from ngi.clock.counters import Counters
 from ngi.clock.phase_clock import PhaseClock
+from ngi.clock.progress import Progress
 from ngi.explore import ChainInfo, ChainState, ResolutionSchedule, Sampler, nothing_known
 from ngi.learn.ahead import ProposalsAhead
 from ngi.learn.batch import ENDLESS, Batch, Feedback
@@ -68,9 +69,10 @@ class TrainingStream:
         self.reuse_probability = 0.0
         self.chain_record: dict[str, np.ndarray] | None = None  # of a generated batch
         self.description: Description | None = None  # of states, for samplers that need it
+        self.progress: Progress | None = None  # where the last steps are on stored patches
         self._chain_info: ChainInfo | None = None
         self._samples = samples
-        self._policy = reuse.policy
+        self.policy = reuse.policy
         self._schedule = schedule
         self._when_late = reuse.when_late
         self._generator = torch.Generator().manual_seed(seed)
@@ -99,7 +101,7 @@ class TrainingStream:
     def can_do_without(self, batch: Batch) -> bool:
         """Whether the batches that follow do not depend on the losses of this one."""
         # Chains learn from generated batches only, drawing rule and policy from all.
-        return not (batch.generated or self.store.draws_by_loss or self._policy.by_loss)
+        return not (batch.generated or self.store.draws_by_loss or self.policy.by_loss)
 
     def feedback_later(self, finish: Callable[[], None]) -> None:
         """Answers the last batch without its losses. RuntimeError where they are needed at once.
@@ -122,14 +124,11 @@ class TrainingStream:
 
     def learn(self, batch: Batch, losses: torch.Tensor) -> None:
         """Lets store and policy learn from a batch's losses [n]."""
-        losses = losses.detach().float().cpu()
+        losses, large = losses.detach().float().cpu(), batch.patches.large_step.cpu()
         with self.clock.phase("reuse"):
             self.store.update(batch.ids.cpu(), losses)
-            self._policy_state = self._policy.update(
-                self._policy_state,
-                reused=not batch.generated,
-                losses=losses,
-                large_step=batch.patches.large_step.cpu(),
+            self._policy_state = self.policy.update(
+                self._policy_state, reused=not batch.generated, losses=losses, large_step=large
             )
 
     def catch_up(self) -> None:
@@ -181,19 +180,19 @@ class TrainingStream:
     def _next(self) -> Batch:
         ahead = self._propose()
         with self.clock.phase("reuse"):
-            self.reuse_probability = self._policy.probability(
+            self.reuse_probability = self.policy.probability(
                 self._policy_state,
                 generated_batches=self.counters.generated_batches,
                 store_size=len(self.store),
                 store_capacity=self.store.capacity,
             )
-            reused = self._policy.reuses(
+            reused = self.policy.reuses(
                 self.reuse_probability,
                 draw=torch.rand((), generator=self._generator, dtype=torch.float64).item(),
                 batches=self.counters.iteration,
                 generated_batches=self.counters.generated_batches,
             )
-            if reused or self._postpone(ahead):
+            if reused or self._put_off(ahead):
                 ids = self.store.draw(self.sampler.chains, self._generator)
                 return Batch(
                     self._samples.rearranged(self.store.get(ids), self._generator),
@@ -225,8 +224,12 @@ class TrainingStream:
             self._ahead.start(self._samples)
         return self._ahead
 
-    def _postpone(self, ahead: ProposalsAhead) -> bool:
-        postponed = self._when_late == "reuse" and self.reuse_probability > 0 and ahead.late
+    def _put_off(self, ahead: ProposalsAhead) -> bool:
+        if self.reuse_probability == 0:
+            return False
+        if self.progress is not None and self.progress.too_late:
+            return True
+        postponed = self._when_late == "reuse" and ahead.late
         self.counters.batches_postponed += postponed
         return postponed
 
@@ -276,12 +279,13 @@ class TrainingStream:
 
     def _accept(self, batch: Batch, feedback: Feedback) -> None:
         assert self._ahead is not None
+        proposals = self._ahead.proposals
         unscored = torch.zeros(self.sampler.chains)  # looked at by no rule
         losses = self.new_losses.add(feedback.losses.detach().float().cpu(), feedback.noise)
         proposed, current = feedback.target_proposed, feedback.target_current
         self.chains, self._chain_info = self.sampler.accept(
             self.chains,
-            self._ahead.proposals,
+            proposals,
             batch.ids,
             target_current=unscored if current is None else current,
             target_proposed=unscored if proposed is None else proposed,
@@ -289,10 +293,7 @@ class TrainingStream:
             losses=losses if self.description is None else self.description.errors(batch.patches),
         )
         self.chain_record = chain_record(
-            self._ahead.proposals,
-            self._chain_info,
-            target_proposed=proposed,
-            target_current=current,
+            proposals, self._chain_info, target_proposed=proposed, target_current=current
         )
         self._ahead = None
         self.store.pin(self.chains.patch)

@@ -38,6 +38,7 @@ class ReusePolicy(Protocol):
     """Decides whether the next batch is a reused one."""
 
     by_loss: bool = False  # whether it depends on the losses
+    stored_alone: float = 0.0  # the last share of a run's steps, in which no batch is new
 
     def init(self) -> PolicyState:
         """The state at the start of a run."""
@@ -107,31 +108,50 @@ class FixedProbability(ReusePolicy):
 
     Generated batches come at even distances, not by chance: were they drawn, one run would have a
     fifth more patches than another of as many steps, and that is not what samplers differ by.
+
+    stored_alone: share of a run's steps, the last ones, that are on stored patches alone
+        (`ngi.learn.Progress`). A patch that comes late is hardly trained on
     """
 
-    def __init__(self, *, bootstrap_batches: int, probability: float) -> None:
+    def __init__(
+        self, *, bootstrap_batches: int, probability: float, stored_alone: float = 0.0
+    ) -> None:
         _check_bootstrap(bootstrap_batches)
         if not 0 <= probability <= 1:
             raise ValueError(f"probability: {probability}: give a number in [0, 1]")
+        if not 0 <= stored_alone < 1:
+            raise ValueError(f"stored_alone: {stored_alone}: give a number in [0, 1)")
+        self.stored_alone = stored_alone
         self._bootstrap_batches = bootstrap_batches
         self._probability = probability
 
     @classmethod
     def by_samples(
-        cls, *, bootstrap_batches: int, times_at_32: float, samples_per_pixel: int
+        cls,
+        *,
+        bootstrap_batches: int,
+        times_at_32: float,
+        samples_per_pixel: int,
+        stored_alone: float = 0.0,
     ) -> Self:
         """So that a patch is trained on the more often the less noise it has (ours, docs/learner).
 
         times_at_32: how often one of 32 samples per pixel is, on average, at least once. Others
             are in proportion to √(samples per pixel), to which noise is inversely proportional,
             up to `CLEANEST`; noisier ones as often
+        stored_alone: so much more comes before, that it is as much in all
 
         Raises ValueError where times_at_32 is not a finite number above 0.
         """
         if not 0 < times_at_32 < math.inf:
             raise ValueError(f"times_at_32: {times_at_32}: give a finite number above 0")
         times = times_at_32 * math.sqrt(min(max(samples_per_pixel, 32), CLEANEST) / 32)
-        return cls(bootstrap_batches=bootstrap_batches, probability=max(0.0, 1 - 1 / times))
+        steps = times * (1 - stored_alone)  # from one new batch to the next, while there are any
+        return cls(
+            bootstrap_batches=bootstrap_batches,
+            probability=1 - 1 / steps if steps > 1 else 0.0,
+            stored_alone=stored_alone,
+        )
 
     def probability(
         self, state: PolicyState, *, generated_batches: int, store_size: int, store_capacity: int

@@ -222,3 +222,37 @@ def test_the_command_measures_what_is_missing_and_nothing_else(
     assert capsys.readouterr().out.count("scoring") == 1, "another seed is not looked at again"
     assert not (tmp_path / "run").exists()
     assert train(model_clock(tmp_path, "budget.seconds=0.001", "evaluation.count=1"))["finished"]
+
+
+def test_the_last_steps_are_on_stored_patches_and_the_rate_falls_during_these_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """These are a quarter of the steps, and far less of the seconds."""
+    rates = []
+    step = torch.optim.Adam.step
+
+    def noted(self: torch.optim.Adam, *arguments: Any, **options: Any) -> Any:
+        rates.append(self.param_groups[0]["lr"])
+        return step(self, *arguments, **options)
+
+    monkeypatch.setattr(torch.optim.Adam, "step", noted)
+    config = with_costs(
+        model_clock(
+            tmp_path,
+            *("reuse.policy._target_=ngi.reuse.FixedProbability", "+reuse.policy.probability=0.5"),
+            *("~reuse.policy.beta", "~reuse.policy.ema_coefficient"),
+            *("+reuse.policy.stored_alone=0.25", "evaluation.count=1"),
+            *("schedule=warmup_stable_decay", "schedule.warmup_steps=0"),
+            "schedule.decay_share=0.25",
+        )
+    )
+    result = train(config)
+    generated = pd.read_csv(tmp_path / "run" / "steps.csv")["generated_batches"]
+    steps, new = result["steps"], int(generated.searchsorted(generated.iloc[-1]))
+    of_a_batch = 1.003 / 0.113  # in steps
+    assert new < 0.75 * steps <= new + 2 + of_a_batch, "as many are new as leave time for the rest"
+    assert result["run_seconds"] == pytest.approx(15, abs=0.113)
+    whole = rates.count(rates[0])
+    assert whole == pytest.approx(0.75 * steps, abs=1.1)
+    assert rates[:whole] == [rates[0]] * whole
+    assert rates[-1] < 0.1 * rates[0]

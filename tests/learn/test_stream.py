@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from ngi.explore import GrowingResolution, LatinHypercube, ProposalDistribution, Sobol
-from ngi.learn import TrainingStream
+from ngi.learn import Budget, Progress, TrainingStream
 from ngi.render import AnalyticRenderer
 from ngi.render.protocol import RenderedPatches
 from ngi.reuse import (
@@ -218,3 +218,31 @@ def test_log_columns_do_not_change(tmp_path: Path) -> None:
 def test_an_unknown_word_for_late_patches_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"reuse\.when_late: 'skip'.*\['wait', 'reuse'\]"):
         make(tmp_path, when_late="skip")
+
+
+@pytest.mark.parametrize("late", ["wait", "reuse"])
+def test_the_last_share_of_the_steps_is_on_stored_patches(late: str, tmp_path: Path) -> None:
+    policy = FixedProbability(bootstrap_batches=3, probability=0.5, stored_alone=0.2)
+    stream = make(tmp_path, policy=policy, when_late=late)
+    stream.progress = Progress(
+        budget=Budget(steps=50),
+        clock=stream.clock,
+        counters=lambda: stream.counters,
+        stored_alone=policy.stored_alone,
+    )
+    generated = [batch.generated for batch in steps(stream, 50)]
+    assert sum(generated[:40]) == pytest.approx(3 + 0.5 * 37, abs=1)
+    assert generated[38:40].count(True) == 1, "new ones come to the end of the first share"
+    assert not any(generated[40:])
+    assert stream.counters.batches_postponed == 0
+
+
+def test_a_batch_that_has_to_be_new_is_never_too_late(tmp_path: Path) -> None:
+    stream = make(tmp_path, policy=FixedProbability(bootstrap_batches=6, probability=0.5))
+    stream.progress = Progress(
+        budget=Budget(steps=5),
+        clock=stream.clock,
+        counters=lambda: stream.counters,
+        stored_alone=0.2,
+    )
+    assert all(batch.generated for batch in steps(stream, 5))

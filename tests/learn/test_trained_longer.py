@@ -20,11 +20,17 @@ pytestmark = [*IGNORED, RESUMED]
 WSD = ("schedule=warmup_stable_decay", "schedule.warmup_steps=3", "schedule.decay_share=0.5")
 FORGETFUL = "reuse.store.capacity=12"
 """What the checkpoint before the decay needs is forgotten by the end of the run."""
+STORED_ALONE = (
+    *("reuse.policy._target_=ngi.reuse.FixedProbability", "+reuse.policy.probability=0.6"),
+    *("~reuse.policy.beta", "~reuse.policy.ema_coefficient", "+reuse.policy.stored_alone=0.4"),
+)
 LEARNERS = {
     "the paper's": ("run.checkpoint_steps=9",),
     "decay": (*WSD, FORGETFUL),
     "decay, muon, averages": (*WSD, "optimizer=muon", "averaging=exponential"),
     "decay, bf16": (*WSD, "optimizer=muon", "trainer=bf16"),
+    "decay, before it stored patches alone": (*WSD, "schedule.decay_share=0.2", *STORED_ALONE),
+    "stored patches alone at last": STORED_ALONE,
 }
 
 

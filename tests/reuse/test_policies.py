@@ -180,6 +180,23 @@ def test_at_32_samples_ours_reuses_as_often_as_when_its_figures_were_measured() 
     assert policy.probability(policy.init(), **LATER) == 0.92
 
 
+def test_where_the_last_steps_bring_nothing_new_the_others_bring_as_much_more() -> None:
+    policy = FixedProbability.by_samples(
+        bootstrap_batches=0, times_at_32=12.5, samples_per_pixel=32, stored_alone=0.2
+    )
+    assert policy.stored_alone == 0.2
+    new = 1 - policy.probability(policy.init(), **LATER)
+    assert new * (1 - 0.2) == pytest.approx(1 / 12.5)
+
+
+@pytest.mark.parametrize("share", [-0.1, 1.0, float("nan")])
+def test_the_last_share_of_the_steps_is_in_range(share: float) -> None:
+    with pytest.raises(ValueError, match=rf"stored_alone: {share}: give a number in \[0, 1\)"):
+        FixedProbability.by_samples(
+            bootstrap_batches=0, times_at_32=12.5, samples_per_pixel=32, stored_alone=share
+        )
+
+
 def test_patches_that_are_to_be_trained_on_less_than_once_are_not_reused() -> None:
     policy = FixedProbability.by_samples(bootstrap_batches=0, times_at_32=0.5, samples_per_pixel=32)
     assert policy.probability(policy.init(), **LATER) == 0

@@ -25,8 +25,8 @@ SAMPLERS = (UNIFORM, *(f"{target}_{rule}" for target, rule in product(TARGETS, A
 
 SELF_TUNING = ("reuse=self_tuning", "reuse.policy.bootstrap_batches=20", "reuse.policy.beta=2.0")
 """With the paper's 100 and 4.6 hardly a batch would be new: by 2.0 it is 14 % at equal losses."""
-BY_SAMPLES = ("reuse=by_samples",)
-"""That of `method=ours`, whoever chooses the samples."""
+BY_SAMPLES = ("reuse=by_samples", "reuse.policy.stored_alone=0")
+"""That of `method=ours` when the map was made, whoever chooses the samples."""
 BY_LOSS = ("reuse=by_loss",)
 """The same, stored patches drawn with replacement, a tenth in proportion to their losses."""
 NO_REUSE = ("reuse=never",)
