@@ -1,8 +1,11 @@
 """Every method differs from the others where its name says, and nowhere else."""
 
+from dataclasses import replace
+from typing import Any
+
 import pytest
 from hydra.utils import instantiate
-from omegaconf import open_dict
+from omegaconf import DictConfig, open_dict
 
 from analysis.claims import WITH_OURS
 from tests.config.command_line import CONF, composed
@@ -187,23 +190,61 @@ def test_the_denoiser_gets_8_samples_and_896_patches_whatever_the_budget(budget:
 
 
 CHANGED = {
-    "muon": "optimizer",
-    "decay": "schedule",
-    "averaging": "averaging",
-    "encodings": "model",
-    "relative_positions": "model",
-    "relative_loss": "loss",
-    "camera_left_out": "data",
-    "centred_patches": "data",
-    "denoised_targets": "data",
-    "direct_light": "renderer",
-    "caustics": "renderer",
-    "specular_bounces": "renderer",
-    "steady_reuse": "reuse",
-    "large_images": "resolution",
-    "small_batches": "sampler",
+    "muon": ("optimizer", "_target_", "adam_lr", "clip_norm", "momentum"),
+    "decay": ("schedule", "_target_", "decay_share", "final_factor", "warmup_steps"),
+    "averaging": ("averaging", "_target_", "decay"),
+    "encodings": (
+        *("model", "_target_", "directions", "octaves", "position_preconditioning"),
+        "relative",  # and emission as radiance, by the target
+    ),
+    "emission_as_radiance": ("model", "_target_"),
+    "relative_positions": ("model", "relative"),
+    "relative_loss": ("loss", "relative_weight"),
+    "mirrored_windows": ("loss", "mirrored"),
+    "camera_left_out": ("data", "camera"),
+    "centred_patches": ("data", "centred"),
+    "denoised_targets": ("data", "denoiser._target_", "traced_share"),
+    "direct_light": ("renderer", "direct"),
+    "caustics": ("renderer", "direct"),
+    "specular_bounces": ("renderer", "specular"),
+    "steady_reuse": (
+        *("reuse", "policy._partial_", "policy._target_", "policy.beta", "policy.ema_coefficient"),
+        *("policy.bootstrap_batches", "policy.times_at_32", "store.rule._target_"),
+    ),
+    "large_images": ("resolution", "start"),
+    "small_batches": ("sampler", "chains"),
 }
-"""The group that each part of ours belongs to."""
+"""The group that each part of ours belongs to, and which of its keys it changes."""
+OF_OURS_ALONE = {"emission_as_radiance", "relative_positions"}
+"""Parts that the paper's network has no place for."""
+ALSO_CHANGED = {
+    "paper_with/muon": {"optimizer.lr"},
+    "paper_with/denoised_targets": {"data.camera", "data.centred"},  # said to be as they are
+    "paper_with/large_images": {"resolution.step"},  # all through the run
+}
+
+
+def leaves(config: DictConfig) -> dict[str, Any]:
+    """Dotted key -> value of all but how a run is called and where it lies."""
+    found: dict[str, Any] = {}
+
+    def collect(value: Any, *names: str) -> None:
+        if isinstance(value, DictConfig) and value:
+            for name in value:
+                collect(value[name], *names, str(name))
+        else:
+            found[".".join(names)] = value
+
+    for part in set(config) - {"hydra", "label", "run"}:
+        collect(config[part], str(part))
+    return found
+
+
+def changed(method: str, whole: dict[str, Any]) -> set[str]:
+    """Keys that this method or the whole one has alone, or with another value."""
+    mine = leaves(composed("budget=small", f"method={method}"))
+    same = {key for key in mine.keys() & whole.keys() if mine[key] == whole[key]}
+    return (mine.keys() | whole.keys()) - same
 
 
 @pytest.mark.parametrize(
@@ -213,15 +254,26 @@ def test_an_ablation_of_the_learner_changes_one_part(ablation: str, base: str) -
     methods = composed("+sweeps=learner").hydra.sweeper.params.method.replace(" ", "").split(",")
     parts = {m.split("/")[1] for m in methods if m.startswith(ablation)}
     beside = {"ours_without": set(), "paper_with": {"tuned_adam"}}[ablation]
-    network = {"ours_without": set(), "paper_with": {"relative_positions"}}[ablation]  # only ours
-    assert parts == {*CHANGED} - network | beside
-    whole = composed("budget=small", f"method={base}")
+    missing = {"ours_without": set(), "paper_with": OF_OURS_ALONE}[ablation]
+    assert parts == {*CHANGED} - missing | beside
+    whole = leaves(composed("budget=small", f"method={base}"))
     for part in parts - beside:
-        group = CHANGED[part]
-        config = composed("budget=small", f"method={ablation}/{part}")
-        assert [key for key in CHANGED.values() if config[key] != whole[key]] == [
-            key for key in CHANGED.values() if key == group
-        ], part
+        method = f"{ablation}/{part}"
+        group, *keys = CHANGED[part]
+        expected = {f"{group}.{key}" for key in keys} | ALSO_CHANGED.get(method, set())
+        assert changed(method, whole) == expected, part
+
+
+def test_of_the_losses_terms_one_is_taken_out_or_added() -> None:
+    ours, papers = (instantiate(composed(f"loss={name}").loss) for name in ("relative", "l1_dssim"))
+    for part, of_ours, of_papers in (
+        ("relative_loss", {"relative_weight": 0.0}, {"relative_weight": 1.0}),
+        ("mirrored_windows", {"mirrored": False}, {"mirrored": True}),
+    ):
+        without = instantiate(composed(f"method=ours_without/{part}").loss)
+        added = instantiate(composed(f"method=paper_with/{part}").loss)
+        assert (without, added) == (replace(ours, **of_ours), replace(papers, **of_papers))
+    assert replace(ours, relative_weight=0.0, mirrored=False) == papers
 
 
 @pytest.mark.parametrize(("of_the_paper", "of_ours"), WITH_OURS.items())
