@@ -64,22 +64,16 @@ class Component:
         return f"{self.name}-{hashlib.sha256(canonical.encode()).hexdigest()[:12]}"
 
 
-def components(settings: Mapping[str, Any], *, renderer: Renderer, scored: bool) -> list[Component]:
+def components(
+    settings: Mapping[str, Any], *, renderer: Renderer, scored: bool, patches_per_vector: int
+) -> list[Component]:
     """Of a run with this resolved configuration, as plain data.
 
-    scored: whether its sampler looks at the targets of the chains' current states.
+    scored: whether its sampler looks at the targets of the chains' current states
+    patches_per_vector: how many patches its sampler draws of one scene, which is set up for all
     """
     sampler = settings["sampler"]
-    samples = {
-        key: value
-        for key, value in settings["data"].items()
-        if not key.startswith("_") and key not in COSTING_NO_STEP
-    }
-    # Else nothing, so that what is measured already stays what it is called.
-    if renderer.halves:
-        samples["halves"] = True
-    if not (target := settings["data"]["_target_"]).startswith("ngi."):  # a class of one's own
-        samples["samples"] = target
+    samples = _samples(settings["data"], renderer)
     patches = {
         "patches": sampler["chains"],
         "patch_size": renderer.patch_size,
@@ -105,6 +99,8 @@ def components(settings: Mapping[str, Any], *, renderer: Renderer, scored: bool)
         **_gpu(),
         **_without_llvm(renderer),
     }
+    if patches_per_vector > 1:  # else nothing: what is measured already stays what it is called
+        rendering["patches_per_vector"] = patches_per_vector
     found = [
         Component("training", training),
         Component("exploring", {**_proposing(sampler), **patches}),
@@ -113,6 +109,21 @@ def components(settings: Mapping[str, Any], *, renderer: Renderer, scored: bool)
     if scored:
         found.append(Component("scoring", {"target": sampler["target"], **training}))
     return found
+
+
+def _samples(data: Mapping[str, Any], renderer: Renderer) -> dict[str, Any]:
+    """What is rendered for a sample, and what is made of it."""
+    samples = {
+        key: value
+        for key, value in data.items()
+        if not key.startswith("_") and key not in COSTING_NO_STEP
+    }
+    # Else nothing, so that what is measured already stays what it is called.
+    if renderer.halves:
+        samples["halves"] = True
+    if not (target := data["_target_"]).startswith("ngi."):  # a class of one's own
+        samples["samples"] = target
+    return samples
 
 
 def _costing_the_same(model: Mapping[str, Any]) -> dict[str, Any]:

@@ -177,7 +177,12 @@ def run_components(config: DictConfig, *, renderer: Renderer) -> list[learn.Comp
             "sampler: it looks at patches before they are traced, which the model clock does not "
             "count; with budget.clock=wall, or with budget.steps, there is no need to"
         )
-    return learn.components(plain(config), renderer=renderer, scored=sampler.needs_current)
+    return learn.components(
+        plain(config),
+        renderer=renderer,
+        scored=sampler.needs_current,
+        patches_per_vector=sampler.patches_per_vector,
+    )
 
 
 def run_costs(

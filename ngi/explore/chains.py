@@ -132,6 +132,12 @@ class MarkovChains:
         """Whether `accept` wants the current states' targets; if not, nothing need be scored."""
         return self.acceptance.needs_current
 
+    @property
+    def patches_per_vector(self) -> int:
+        """What the proposal says; 1 where it says nothing."""
+        number: int = getattr(self.proposal, "patches_per_vector", 1)
+        return number
+
     def init(self, state_dimensions: int) -> ChainState:
         """Chains that hold no state yet; each enters the first one it proposes.
 

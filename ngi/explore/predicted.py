@@ -65,6 +65,7 @@ class PredictedLoss:
 
     needs_current = False
     needs_description = False
+    patches_per_vector = 1
 
     def __init__(
         self,

@@ -18,6 +18,11 @@ class Sampler(Protocol):
     target: Target
 
     @property
+    def patches_per_vector(self) -> int:
+        """How many patches of a batch, one after the other, have the same scene vector."""
+        ...
+
+    @property
     def needs_current(self) -> bool:
         """Whether the states where it stands have to be scored, too."""
         ...

@@ -90,6 +90,8 @@ class SobolQuarters(Sobol):
     scene vectors with large ones, and sees more of each.
     """
 
+    patches_per_vector = len(QUARTERS)
+
     def propose(self, position: Tensor, generator: torch.Generator, *, batch: int) -> Proposals:
         """Nothing is drawn from `generator`. ValueError for n that is no multiple of 4."""
         patches, dimensions = position.shape

@@ -79,7 +79,10 @@ def _measure(
     if any(component.name == "rendering" for component in missing):
         renderer.warm_up()
         measured["rendering"] = rendering_seconds(
-            build_samples(config, renderer=renderer), count=config.sampler.chains, seconds=SECONDS
+            build_samples(config, renderer=renderer),
+            count=config.sampler.chains,
+            patches_per_vector=instantiate(config.sampler).patches_per_vector,
+            seconds=SECONDS,
         )
     found = provenance(backend=renderer.description)
     measured_by = {key: found[key] for key in ("commit", "dirty", "machine")}

@@ -30,16 +30,23 @@ FEWEST_ROUNDS = 5
 MOST_BATCHES = 50
 
 
-def rendering_seconds(samples: Samples, *, count: int, seconds: float) -> Seconds:
+def rendering_seconds(
+    samples: Samples, *, count: int, patches_per_vector: int, seconds: float
+) -> Seconds:
     """Of batches of so many samples, at states drawn uniformly from the scene's whole hypercube.
 
     Where chains gather a patch may cost more or less than on the average over the scene, but that
-    differs from run to run. seconds: after so long no batch is begun, once there were three.
+    differs from run to run.
+
+    patches_per_vector: so many samples, one after the other, have the same scene vector
+    seconds: after so long no batch is begun, once there were three
     """
     generator = torch.Generator().manual_seed(0)
 
     def render() -> None:
         states = torch.rand(count, samples.dimensions + 2, generator=generator)
+        vectors = states[::patches_per_vector, :-2]
+        states[:, :-2] = vectors.repeat_interleave(patches_per_vector, dim=0)[:count]
         seed = int(torch.randint(2**31, (), generator=generator))
         resolution = SIDE * samples.patch_size
         samples.start_patches(states, resolution=resolution, seed=seed).result()

@@ -17,6 +17,7 @@ from ngi.learn import Component, CostFile, ModelClock
 from ngi.machine.backend import VARIANTS
 from ngi.patches import MovingPoints
 from ngi.render import AnalyticRenderer
+from tests.config.command_line import CONF
 from tests.learn.composition import run_config
 
 MEASURED_BY = {"commit": "abc", "machine": {"processor": "abacus"}}
@@ -26,8 +27,7 @@ def component(name: str = "training", **settings: object) -> Component:
     return Component(name, {"model": {"layers": 3}, **settings})
 
 
-@cache
-def keys(*overrides: str, dimensions: int = 3) -> dict[str, str]:
+def parts(*overrides: str, dimensions: int = 3) -> list[Component]:
     config = run_config(*overrides)
     renderer = AnalyticRenderer(
         dimensions=dimensions,
@@ -35,7 +35,12 @@ def keys(*overrides: str, dimensions: int = 3) -> dict[str, str]:
         samples_per_pixel=config.renderer.get("samples_per_pixel", 1),
         halves=config.renderer.get("halves", False),
     )
-    return {part.name: part.key for part in run_components(config, renderer=renderer)}
+    return run_components(config, renderer=renderer)
+
+
+@cache
+def keys(*overrides: str, dimensions: int = 3) -> dict[str, str]:
+    return {part.name: part.key for part in parts(*overrides, dimensions=dimensions)}
 
 
 def test_what_a_sampler_looks_at_is_not_counted_and_that_is_said() -> None:
@@ -122,6 +127,20 @@ def test_halves_have_costs_of_their_own_and_without_them_all_is_called_as_before
     whole, halves = keys(even), keys(even, "+renderer.halves=true")
     assert keys(even, "+renderer.halves=false") == whole
     assert not {*whole.values()} & {*halves.values()}
+
+
+def test_patches_of_one_scene_are_rendered_at_a_price_of_their_own() -> None:
+    """Their scene is set up once; trained on they are as others."""
+    each, of_four = (keys(f"sampler={name}") for name in ("sobol", "sobol_quarters"))
+    assert {name for name in each if each[name] != of_four[name]} == {"rendering", "exploring"}
+
+
+def test_a_scene_for_each_patch_is_called_as_before_there_were_others() -> None:
+    samplers = {file.stem for file in (CONF / "sampler").glob("*.yaml")}
+    others = samplers - {"sobol_quarters", "predicted_from_buffers"}  # this one is not counted
+    assert {keys(f"sampler={name}")["rendering"] for name in others} == {keys()["rendering"]}
+    [rendering] = [part for part in parts() if part.name == "rendering"]
+    assert "patches_per_vector" not in rendering.settings
 
 
 def test_what_a_network_is_given_of_the_scene_has_a_price() -> None:

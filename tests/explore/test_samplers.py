@@ -21,6 +21,7 @@ from ngi.explore import (
     NormalPerturbation,
     Signals,
     Sobol,
+    SobolQuarters,
 )
 
 PROPOSALS = [
@@ -142,3 +143,13 @@ def test_always_converges_to_the_uniform_distribution() -> None:
 def test_greedy_climbs_to_the_maximum() -> None:
     counts = final_histogram(Greedy(accept_equal=False), density, steps=60).reshape(6, 6)
     assert counts[5, :3].sum() > 0.95 * counts.sum()
+
+
+@pytest.mark.parametrize("proposal", [*PROPOSALS, SobolQuarters(seed=1)])
+def test_a_sampler_says_how_many_patches_it_draws_of_one_scene_vector(proposal) -> None:
+    sampler = MarkovChains(
+        chains=16, proposal=proposal, target=ConstantTarget(), acceptance=Always()
+    )
+    proposed = sampler.propose(sampler.init(5), torch.Generator(), batch=3).position
+    _, patches = proposed[:, :-2].unique_consecutive(dim=0, return_counts=True)
+    assert set(patches.tolist()) == {sampler.patches_per_vector}

@@ -19,7 +19,8 @@ from tests.learn.composition import run_config
 def keys() -> dict[str, str]:
     settings = plain(run_config("scene=mirror"))
     renderer = AnalyticRenderer(dimensions=3, patch_size=32)
-    return {c.name: c.key for c in components(settings, renderer=renderer, scored=True)}
+    found = components(settings, renderer=renderer, scored=True, patches_per_vector=1)
+    return {component.name: component.key for component in found}
 
 
 def test_costs_of_every_component_are_those_of_one_device() -> None:

@@ -9,11 +9,12 @@ import pandas as pd
 import pytest
 import torch
 from omegaconf import DictConfig
+from torch import Tensor
 
 from ngi.config.build import run_components
-from ngi.learn import CostFile, TrainingStream
+from ngi.learn import CostFile, PatchSamples, TrainingStream
 from ngi.machine.memory import COLUMNS
-from ngi.render import AnalyticRenderer
+from ngi.render import AnalyticRenderer, PatchJob
 from ngi.studies import costs as costs_command
 from ngi.train import train
 from tests.learn.command_line import SIZE
@@ -256,3 +257,21 @@ def test_the_last_steps_are_on_stored_patches_and_the_rate_falls_during_these_al
     assert whole == pytest.approx(0.75 * steps, abs=1.1)
     assert rates[:whole] == [rates[0]] * whole
     assert rates[-1] < 0.1 * rates[0]
+
+
+def test_the_command_renders_as_many_patches_of_a_scene_as_the_sampler(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    steps = {part: {phase: [0.1] for phase in phases} for part, phases in SECONDS.items()}
+    monkeypatch.setattr(costs_command, "_step_seconds", lambda *_, **__: steps)
+    monkeypatch.setattr(costs_command, "SECONDS", 0.0)
+    asked = []
+
+    def watched(samples: PatchSamples, states: Tensor, **given: Any) -> PatchJob:
+        asked.append(states)
+        return start(samples, states, **given)
+
+    start = PatchSamples.start_patches
+    monkeypatch.setattr(PatchSamples, "start_patches", watched)
+    costs_command.measure(model_clock(tmp_path, "sampler=sobol_quarters", "sampler.chains=8"))
+    assert {len(states[:, :-2].unique(dim=0)) for states in asked} == {2}

@@ -1,6 +1,8 @@
+from torch import Tensor
+
 from ngi.clock.phase_clock import PHASES
 from ngi.learn import PatchSamples
-from ngi.render import AnalyticRenderer
+from ngi.render import AnalyticRenderer, PatchJob
 from ngi.studies.step_costs import TimedStep, rendering_seconds, step_seconds
 
 
@@ -46,16 +48,22 @@ def test_a_disturbed_step_gives_no_negative_cost() -> None:
     assert step_seconds([[GENERATED, stored_late]])["exploring"]["reuse"] == [0.0]
 
 
+class Watched(PatchSamples):
+    """Keeps what is asked for."""
+
+    def __init__(self) -> None:
+        super().__init__(renderer=AnalyticRenderer(dimensions=2, patch_size=8))
+        self.asked: list[tuple[Tensor, int]] = []
+
+    def start_patches(self, states: Tensor, *, resolution: int, seed: int) -> PatchJob:
+        self.asked.append((states, resolution))
+        return super().start_patches(states, resolution=resolution, seed=seed)
+
+
 def test_rendering_is_timed_at_new_states_of_the_whole_scene() -> None:
-    asked = []
-
-    class Renderer(AnalyticRenderer):
-        def render_patches(self, states, *, resolution, seed):  # type: ignore[no-untyped-def]
-            asked.append((states, resolution))
-            return super().render_patches(states, resolution=resolution, seed=seed)
-
-    renderer = Renderer(dimensions=2, patch_size=8)
-    seconds = rendering_seconds(PatchSamples(renderer=renderer), count=4, seconds=0.0)
+    samples = Watched()
+    seconds = rendering_seconds(samples, count=4, patches_per_vector=1, seconds=0.0)
+    asked = samples.asked
     assert len(seconds["render"]) == 3
     assert len(asked) == 4, "the first is no timing"
     assert all(states.shape == (4, 4) and resolution == 32 for states, resolution in asked)
@@ -63,3 +71,13 @@ def test_rendering_is_timed_at_new_states_of_the_whole_scene() -> None:
     assert len(numbers) == 64
     assert min(numbers) < 0.1
     assert max(numbers) > 0.9
+
+
+def test_patches_of_one_scene_are_timed_one_after_the_other() -> None:
+    samples = Watched()
+    rendering_seconds(samples, count=8, patches_per_vector=4, seconds=0.0)
+    for states, _ in samples.asked:
+        vectors, patches = states[:, :-2].unique_consecutive(dim=0, return_counts=True)
+        assert (len(vectors), patches.tolist()) == (2, [4, 4])
+        assert len(states[:, -2:].unique(dim=0)) == 8, "each at a place of its own"
+    assert len({float(number) for states, _ in samples.asked for number in states[:, 0]}) == 8
