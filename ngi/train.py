@@ -36,7 +36,7 @@ def train(config: DictConfig) -> dict[str, Any]:
 
     Where it says `path_tracing`, that takes the network's place and nothing is trained. A finished
     run is not run again. Raises ValueError for a configuration, scene, folder or checkpoint that
-    does not fit, before any long work; `Interrupted` after SIGTERM or SIGINT.
+    does not fit, before any long work; `Interrupted` after a signal.
     """
     from ngi import learn  # PyTorch and Lightning take seconds that --help need not wait for
     from ngi.learn.code_change import heed_code_change

@@ -84,9 +84,8 @@ def _module(
         if place in sys.path:
             sys.path.remove(place)
         sys.path.insert(0, place)
-    signal.signal(
-        signal.SIGINT, signal.default_int_handler
-    )  # ignored in the background of a script
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored in a script's background
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)  # ignored by nohup
     sys.argv = [module, *words]
     sys.modules.pop(module, None)  # it would be said to be there before it runs
     try:

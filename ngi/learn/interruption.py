@@ -1,4 +1,4 @@
-"""SIGTERM and Ctrl-C: a run ends soon, where the same command goes on without a step lost."""
+"""SIGTERM, SIGHUP and Ctrl-C: a run ends soon, the same command goes on without a step lost."""
 
 import logging
 import signal
@@ -12,7 +12,7 @@ T = TypeVar("T")
 
 log = logging.getLogger(__name__)
 
-SIGNALS = (signal.SIGTERM, signal.SIGINT)
+SIGNALS = (signal.SIGTERM, signal.SIGHUP, signal.SIGINT)
 
 
 class Interrupted(SystemExit):
@@ -25,7 +25,7 @@ class Interrupted(SystemExit):
 
 
 class Interruption:
-    """The context within which SIGTERM and SIGINT raise `Interrupted`: at once, unless `deferred`.
+    """The context within which `SIGNALS` raise `Interrupted`: at once, unless `deferred`.
 
     Further signals change nothing, but that a second SIGINT raises KeyboardInterrupt at once.
 
@@ -40,7 +40,7 @@ class Interruption:
 
     def __enter__(self) -> Self:
         for number in SIGNALS:
-            if signal.getsignal(number) != signal.SIG_IGN:  # as SIGINT is for jobs in background
+            if signal.getsignal(number) != signal.SIG_IGN:  # by nohup, or in the background
                 self._before[number] = signal.signal(number, self._receive)
         return self
 

@@ -1,4 +1,4 @@
-"""SIGTERM and Ctrl-C end a run soon, and without a step lost."""
+"""SIGTERM, SIGHUP and Ctrl-C end a run soon, and without a step lost."""
 
 import os
 import pickle
@@ -161,7 +161,9 @@ def test_an_exit_within_a_step_goes_on_from_the_checkpoint_before(
     assert_same_run(tmp_path / "run", unbroken / "run")
 
 
-@pytest.mark.parametrize(("number", "status"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
+@pytest.mark.parametrize(
+    ("number", "status"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129), (signal.SIGINT, 130)]
+)
 def test_a_signal_ends_the_whole_sweep(tmp_path: Path, number: signal.Signals, status: int) -> None:
     endless = ("budget.steps=100000", "run.checkpoint_steps=7", "seed=0,1")
     log = tmp_path / "output"
