@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from torch import Tensor
 
     from ngi.render import Renderer
+    from ngi.view.screen import Pixels
 
 SUFFIXES = (".png", ".exr")
 
@@ -48,12 +49,12 @@ class PictureOptions:
 
 
 def write_picture(options: PictureOptions) -> None:
-    """Writes the picture, and where a reference is asked for that, the error map and the metrics.
+    """Writes the picture, and where a reference is asked for that and the error map beside it.
+
+    Prints every file's name, and the metrics.
 
     Raises ValueError or OSError, naming key and value, before anything is rendered.
     """
-    from PIL import Image
-
     from ngi.evaluate import Lpips, error_picture, image_metrics
     from ngi.view.screen import CURVES
     from ngi.view.trained_run import TrainedRun
@@ -88,9 +89,10 @@ def write_picture(options: PictureOptions) -> None:
         if options.reference == 0:
             return
         reference = _traced(options, run.renderer, v)
-    _write(_beside(out, "reference"), reference, options)
-    error = Image.fromarray(error_picture(radiance, reference, run.protocol.epsilon))
-    error.save(_beside(out, "error").with_suffix(".png"))
+    beside, error = _beside(out, "reference"), _beside(out, "error").with_suffix(".png")
+    _write(beside, reference, options)
+    _write_png(error, error_picture(radiance, reference, run.protocol.epsilon))
+    print(f"{beside}, {error}")
     measured = image_metrics(radiance, reference, protocol=run.protocol, lpips=lpips)
     print(", ".join(f"{name} {value:.4g}" for name, value in measured.items() if value is not None))
 
@@ -122,10 +124,7 @@ def _traced(options: PictureOptions, renderer: Renderer, v: Tensor) -> Tensor:
 
 
 def _write(path: Path, radiance: Tensor, options: PictureOptions) -> None:
-    from PIL import Image
-
     from ngi.evaluate.pictures import eight_bit
-    from ngi.files.durable import write_atomically
     from ngi.render.exr import write_exr
     from ngi.view.screen import shown
 
@@ -133,9 +132,17 @@ def _write(path: Path, radiance: Tensor, options: PictureOptions) -> None:
         write_exr(path, radiance)
     else:
         toned = shown(radiance, curve=options.tone_mapping, exposure=options.exposure)
-        picture = BytesIO()
-        Image.fromarray(eight_bit(toned)).save(picture, "png")
-        write_atomically(path, picture.getvalue())
+        _write_png(path, eight_bit(toned))
+
+
+def _write_png(path: Path, pixels: Pixels) -> None:
+    from PIL import Image
+
+    from ngi.files.durable import write_atomically
+
+    picture = BytesIO()
+    Image.fromarray(pixels).save(picture, "png")
+    write_atomically(path, picture.getvalue())
 
 
 def _beside(path: Path, what: str) -> Path:

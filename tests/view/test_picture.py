@@ -60,6 +60,7 @@ def test_a_reference_beside_it_and_the_metrics(trained: Path) -> None:
     assert status == 0, output
     written = json.loads((trained / "run" / "result.json").read_text())["frames"][0]
     assert f"mape {written['mape']:.4g}" in output  # closed formulas have no noise
+    assert "zero_reference.png, zero_error.png\n" in output
     for kind in ("reference", "error"):
         expected = Image.open(trained / "run" / "pictures" / f"hard_00_{kind}.png")
         np.testing.assert_array_equal(
@@ -80,7 +81,18 @@ def test_pixels_that_a_path_made_nan_are_traced_again(
     monkeypatch.setattr(AnalyticRenderer, "render_image", broken)
     status, output = render(trained, "reference=4", "resolution=48", "out=mended.png")
     assert status == 0, output
-    assert output.splitlines()[1:] == expected.splitlines()[1:]  # closed formulas have no noise
+    assert output.splitlines()[2:] == expected.splitlines()[2:]  # closed formulas have no noise
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
+def test_a_full_disk_is_named_and_leaves_the_error_map_that_was_there(trained: Path) -> None:
+    (trained / "full_error.png").write_bytes(b"earlier")
+    (trained / "full_error.png.partial").symlink_to("/dev/full")
+    status, output = render(trained, "reference=4", "resolution=48", "out=full.png")
+    assert status == 2
+    assert "full_error.png" in output
+    assert "Make room on the disk" in output
+    assert (trained / "full_error.png").read_bytes() == b"earlier"
 
 
 def test_v_may_be_given(trained: Path) -> None:
