@@ -47,12 +47,17 @@ def pack(options: PackOptions) -> None:
     if out.exists() and any(out.iterdir()):
         raise ValueError(f"out: {out} is not empty")
     checkpoint = newest_checkpoint(run, settings)
+    origin: dict[str, Any] = json.loads(result.read_text())
+    if checkpoint["global_step"] != origin.get("steps"):
+        raise ValueError(
+            f"run: {run} has a {result.name} of step {origin.get('steps')}, but its newest "
+            f"checkpoint that is whole is of step {checkpoint['global_step']}"
+        )
     weights = trained_weights(checkpoint["state_dict"])
     content = {
         "global_step": checkpoint["global_step"],
         "state_dict": {NETWORK + name: value for name, value in weights.items()},
     }
-    origin: dict[str, Any] = json.loads(result.read_text())
     out.mkdir(parents=True, exist_ok=True)
     with checkpoint_bytes(content) as view:
         write_atomically(out / LAST, view)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -18,6 +19,8 @@ from ngi.learn import Samples, network_of, read_checkpoint
 from ngi.machine.captured import Captured, Function
 from ngi.machine.precision import shown_in
 from ngi.view.run_settings import OpenedRun, made_by, make_samples, opened, plain, settings_of
+
+log = logging.getLogger(__name__)
 
 RECORDS = "ngi.learn.graph_trainer.GraphTrainer"
 """The trainer that has a run's steps recorded."""
@@ -111,7 +114,10 @@ def trained_weights(state: dict[str, Tensor]) -> dict[str, Tensor]:
 
 
 def newest_checkpoint(folder: Path, settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Of the run's two checkpoints the newer one that is whole; raises as `TrainedRun.open`."""
+    """Of the run's two checkpoints the newer one that is whole; raises as `TrainedRun.open`.
+
+    Warns where that is not the newest.
+    """
     if "path_tracing" in settings:
         raise ValueError(
             f"{folder} has no network: path tracing took its place; `ngi video` shows its frames"
@@ -121,9 +127,13 @@ def newest_checkpoint(folder: Path, settings: Mapping[str, Any]) -> dict[str, An
         if not path.exists():
             continue
         try:
-            return read_checkpoint(path)
+            checkpoint = read_checkpoint(path)
         except DamagedError as error:
             problems.append(str(error))
+            continue
+        for problem in problems:
+            log.warning("%s; the checkpoint before it is used", problem)
+        return checkpoint
     if problems:
         raise ValueError("; ".join(problems))
     raise FileNotFoundError(f"{folder}: no checkpoint yet; a run writes one every minute or so")

@@ -1,8 +1,10 @@
 import json
+import shutil
 
 import pytest
 import torch
 
+from ngi.learn import checkpoint_bytes, read_checkpoint
 from ngi.view.pack import main
 from ngi.view.trained_run import TrainedRun
 from tests.learn.command_line import run
@@ -36,6 +38,16 @@ def test_it_says_where_it_is_from_and_holds_no_more(folder) -> None:
     }
     size = sum(file.stat().st_size for file in (folder / "small").iterdir())
     assert size < (folder / "run" / "last.ckpt").stat().st_size / 2
+
+
+def test_weights_of_another_step_than_the_metrics_are_refused(folder, capsys) -> None:
+    older = shutil.copytree(folder / "run", folder / "older")
+    with checkpoint_bytes({**read_checkpoint(older / "last.ckpt"), "global_step": 4}) as view:
+        (older / "previous.ckpt").write_bytes(view)
+    (older / "last.ckpt").write_bytes(b"damaged")
+    assert main([f"run={older}", f"out={folder}/wrong"]) == 2
+    assert "a result.json of step 6, but its newest checkpoint" in capsys.readouterr().err
+    assert not (folder / "wrong").exists()
 
 
 def test_what_cannot_be_packed_is_named(folder, capsys) -> None:

@@ -164,7 +164,9 @@ def test_weights_of_lpips_that_are_missing_are_named_before_anything_is_rendered
     assert status == 0, output  # which needs no LPIPS
 
 
-def test_a_damaged_checkpoint_gives_way_to_the_one_before(tmp_path: Path) -> None:
+def test_a_damaged_checkpoint_gives_way_to_the_one_before_which_is_said(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     status, output = run(tmp_path, RUN, "run.checkpoint_steps=4")
     assert status == 0, output
     newest = tmp_path / "run" / "last.ckpt"
@@ -174,6 +176,8 @@ def test_a_damaged_checkpoint_gives_way_to_the_one_before(tmp_path: Path) -> Non
     status, output = render(tmp_path)
     assert status == 0, output
     assert "step 8" in output
+    assert "last.ckpt is damaged" in caplog.text
+    assert "the checkpoint before it is used" in caplog.text
     (tmp_path / "run" / "previous.ckpt").unlink()
     status, output = render(tmp_path)
     assert status == 2
