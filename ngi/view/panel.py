@@ -12,7 +12,7 @@ from typing import Any
 import viser
 
 from ngi.evaluate.pictures import ERROR_RANGE, error_colours
-from ngi.view.inputs import Control, Input, inputs
+from ngi.view.inputs import Control, Input, Picker, inputs
 from ngi.view.screen import CURVES, PARTS, Screen
 
 RESOLUTIONS = ("64", "128", "256", "384", "512", "768", "900")
@@ -175,6 +175,8 @@ class Panel:
                 return
             for component, number in changed.components(value).items():
                 self._v[component] = number
+            if isinstance(changed, Picker):  # brought into the range
+                made.value = changed.shown(self._v)
             self._used()
 
     def _used(self) -> None:

@@ -100,6 +100,17 @@ def test_what_is_set_in_the_panel_is_v(gui: viser.GuiApi) -> None:
     assert made.v == (0.5,) * 12
 
 
+def test_a_picker_shows_what_becomes_of_a_colour_out_of_the_range(gui: viser.GuiApi) -> None:
+    changes: list[int] = []
+    made = panel(gui, shipped("sphere-caustic"), changes)
+    picker = made._inputs[0][1]
+    picker.value = (255, 100, 0)
+    ends = np.rint(255 * srgb.encoded(np.array([0.95, 0.05]))).tolist()
+    assert picker.value == (ends[0], 100, ends[1])
+    assert (made.v[0], made.v[2]) == (1, 0)
+    assert changes == [1]
+
+
 def test_reset_brings_everything_back(gui: viser.GuiApi) -> None:
     made = panel(gui, shipped("mirror"), [])
     start, screen, pixels = made.v, made.screen, made.resolution
