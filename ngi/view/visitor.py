@@ -18,7 +18,7 @@ from ngi.evaluate import image_metrics
 from ngi.evaluate.pictures import WHITE, side_by_side
 from ngi.render.exr import write_exr
 from ngi.view.panel import Panel
-from ngi.view.scene_view import Place
+from ngi.view.scene_view import PASS_SAMPLES, Place
 from ngi.view.screen import Pixels
 from ngi.view.session import Wish
 from ngi.view.studio import Shown, Studio
@@ -64,7 +64,7 @@ class Visitor:
 
     @property
     def wish(self) -> Wish:
-        return Wish(Place(self._panel.v, self._panel.resolution), self._panel.screen)
+        return Wish(self._place, self._panel.screen)
 
     def show(self, shown: Shown) -> None:
         """Sends a picture; in the thread that made it."""
@@ -72,11 +72,16 @@ class Visitor:
         with self._sending:
             self._send(shown)
         self._moments.append(perf_counter())
+        self._command.value = self._command_line()
         self._panel.say(self._status(shown, sending=perf_counter() - begin))
 
     def failed(self, error: Exception) -> None:
         """Tells why there is no picture, or no file."""
         self._panel.say([f"This failed: {str(error) or type(error).__name__}"])
+
+    @property
+    def _place(self) -> Place:
+        return Place(self._panel.v, self._panel.resolution)
 
     def _send(self, shown: Shown) -> None:
         self._last, self._aspect = shown, self._window()
@@ -175,18 +180,29 @@ class Visitor:
         self._client.send_file_download("picture.exr", _exr(shown), save_immediately=True)
 
     def _command_line(self) -> str:
+        screen = self._panel.screen
+        if "buffers" in screen.needs:
+            return "no command makes pictures of buffers"
         v = ",".join(f"{number:.6g}" for number in self._panel.v)
         words = [f"run={self._subject.folder}", f"v=[{v}]", f"resolution={self._panel.resolution}"]
         if self._subject.scene is not None:
             words.append(f"scene={self._subject.scene}")
         if self._subject.supersampled_edges:
             words.append("supersampled_edges=true")
-        screen = self._panel.screen
+        if screen.traces_paths:
+            words.append(f"reference={self._samples}")
         if screen.exposure:
             words.append(f"exposure={screen.exposure:g}")
         if screen.curve != "sRGB":
             words.append(f"tone_mapping={screen.curve}")
         return shlex.join(["ngi", "render", *words, "out=picture.png"])
+
+    @property
+    def _samples(self) -> int:
+        """Per pixel of the path-traced picture, which begins with a single pass."""
+        if self._last is None or self._last.view.place != self._place:
+            return PASS_SAMPLES
+        return self._last.view.samples or PASS_SAMPLES
 
 
 def _exr(shown: Shown) -> bytes:

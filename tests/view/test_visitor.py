@@ -123,6 +123,37 @@ def test_the_command_makes_what_is_seen(browser: Browser) -> None:
     assert options.supersampled_edges
 
 
+@pytest.mark.parametrize(
+    ("show", "sizes", "references"),
+    [
+        ("network", [64], []),
+        ("path tracer", [64], ["reference=24"]),
+        ("network | path tracer | error", [64], ["reference=24"]),
+        ("error", [32], ["reference=8"]),  # which is a preview
+        ("error", [], ["reference=8"]),
+    ],
+)
+def test_the_command_traces_as_many_paths_as_are_seen(
+    browser: Browser, show: str, sizes: list[int], references: list[str]
+) -> None:
+    made = visitor(browser)
+    made._panel._show.value = show
+    for size in sizes:
+        place = Place(tuple(START), size)
+        view = SceneView(place, AnalyticRenderer(dimensions=7, patch_size=16), coloured)
+        for _ in range(3):
+            view.trace()
+        made.show(Shown(made.wish.screen.pixels(view), view, Wish(place, made.wish.screen), True))
+    words = shlex.split(made._command.value)
+    assert [word for word in words if word.startswith("reference=")] == references
+
+
+def test_no_command_makes_the_picture_of_a_buffer(browser: Browser) -> None:
+    made = visitor(browser)
+    made._panel._show.value = "albedo"
+    assert made._command.value == "no command makes pictures of buffers"
+
+
 def test_what_it_says_takes_the_same_room_and_is_no_markup(browser: Browser) -> None:
     """A click that falls while a button moves is lost."""
     made = visitor(browser)
