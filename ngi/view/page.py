@@ -25,6 +25,8 @@ LAST_PORT = 2**16 - 1
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
+EVERYWHERE = ("", "0.0.0.0", "::")
+
 Answer = Response | None
 Processor = Callable[[ServerConnection, Request], Answer | Awaitable[Answer]]
 
@@ -47,8 +49,9 @@ def viser_server(*, host: str, port: int, label: str | None = None) -> viser.Vis
 
 
 def address(host: str, port: int) -> str:
-    """Of the page, for a browser. host: '' listens everywhere."""
-    return f"http://{f'[{host}]' if ':' in host else host or LOOPBACK[0]}:{port}"
+    """Of the page, for a browser; of other machines, too, where it is bound to `EVERYWHERE`."""
+    name = socket.gethostname() if host in EVERYWHERE else host
+    return f"http://{f'[{name}]' if ':' in name else name}:{port}"
 
 
 def check_address(host: str, port: int) -> None:

@@ -1,5 +1,6 @@
 """No page of another origin can drive the viewer."""
 
+import socket
 from collections.abc import Iterator
 from urllib.parse import urlsplit
 
@@ -45,9 +46,19 @@ def test_its_own_page_and_programs_are_let_in(port: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("host", "shown"), [("::1", "[::1]"), ("", "127.0.0.1"), ("example.org", "example.org")]
+    ("host", "shown"),
+    [
+        ("::1", "[::1]"),
+        ("example.org", "example.org"),
+        ("", "box.lan"),
+        ("0.0.0.0", "box.lan"),
+        ("::", "box.lan"),
+    ],
 )
-def test_a_page_is_where_browsers_find_it(host: str, shown: str) -> None:
+def test_a_page_is_where_browsers_find_it(
+    monkeypatch: pytest.MonkeyPatch, host: str, shown: str
+) -> None:
+    monkeypatch.setattr(socket, "gethostname", lambda: "box.lan")
     found = urlsplit(address(host, 8080))
     assert (found.netloc, found.port) == (f"{shown}:8080", 8080)
 
