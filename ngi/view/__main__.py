@@ -68,7 +68,7 @@ def view(options: ViewOptions) -> None:
             Page(studio, shown, resolution=options.resolution, host=options.host, port=options.port)
         ) as page,
     ):
-        print(f"{page.address}; end with Ctrl-C", flush=True)
+        print(f"{page.where}; end with Ctrl-C", flush=True)
         while True:
             studio.work(wait=POLL)
 

@@ -139,7 +139,7 @@ def live_view(
 
     studio = Studio(renderer=run.renderer, predict=predict)
     page = Page(studio, about, resolution=protocol.resolution, host="127.0.0.1", port=port)
-    log.info("%s shows the training", page.address)
+    log.info("%s shows the training", page.where)
     if description is None:
         variables: Sequence[str] = [f"{control.group} {control.name}" for control in about.controls]
     else:

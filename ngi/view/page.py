@@ -124,6 +124,8 @@ class Page:
 
     resolution: pixels a side at first
     host: '127.0.0.1' for browsers of this machine only
+
+    `where` is its address, with the tunnel for it where the port was taken.
     """
 
     def __init__(
@@ -144,7 +146,11 @@ class Page:
             first.up = np.asarray(subject.camera.up)
         self._server.on_client_connect(self._welcome)
         self._server.on_client_disconnect(lambda client: studio.close(client.client_id))
-        self.address = address(host, self._server.get_port())
+        found = self._server.get_port()
+        self.where = address(host, found)
+        if port not in (0, found):
+            tunnel = f"ssh -L {found}:{urlsplit(self.where).netloc} MACHINE"
+            self.where += f" (port {port} is taken; over SSH: {tunnel})"
 
     @property
     def gui(self) -> viser.GuiApi:

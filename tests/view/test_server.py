@@ -2,6 +2,7 @@
 
 import socket
 from collections.abc import Iterator
+from contextlib import closing
 from urllib.parse import urlsplit
 
 import pytest
@@ -12,7 +13,8 @@ from websockets.exceptions import InvalidStatus  # noqa: E402
 from websockets.sync.client import connect  # noqa: E402
 from websockets.typing import Origin, Subprotocol  # noqa: E402
 
-from ngi.view.page import address, is_own_page, viser_server  # noqa: E402
+from ngi.view.page import Page, address, is_own_page, viser_server  # noqa: E402
+from tests.view.browser import studio, subject  # noqa: E402
 
 
 @pytest.fixture(scope="module")
@@ -61,6 +63,28 @@ def test_a_page_is_where_browsers_find_it(
     monkeypatch.setattr(socket, "gethostname", lambda: "box.lan")
     found = urlsplit(address(host, 8080))
     assert (found.netloc, found.port) == (f"{shown}:8080", 8080)
+
+
+def test_a_port_that_is_taken_is_said_with_the_tunnel_to_the_one_in_its_place() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        taken = other.getsockname()[1]
+        page = Page(studio(), subject(), resolution=64, host="127.0.0.1", port=taken)
+        with closing(page):
+            found = page._server.get_port()
+    assert page.where == (
+        f"http://127.0.0.1:{found} (port {taken} is taken; over SSH: "
+        f"ssh -L {found}:127.0.0.1:{found} MACHINE)"
+    )
+
+
+@pytest.mark.parametrize("asked", [0, None])
+def test_of_a_port_that_is_free_only_the_address_is_said(asked: int | None) -> None:
+    if asked is None:
+        with socket.create_server(("127.0.0.1", 0)) as free:
+            asked = free.getsockname()[1]
+    page = Page(studio(), subject(), resolution=64, host="127.0.0.1", port=asked)
+    with closing(page):
+        assert page.where == f"http://127.0.0.1:{page._server.get_port()}"
 
 
 @pytest.mark.parametrize(
