@@ -209,14 +209,16 @@ CHANGED = {
     "specular_bounces": ("renderer", "specular"),
     "steady_reuse": (
         *("reuse", "policy._partial_", "policy._target_", "policy.beta", "policy.ema_coefficient"),
-        *("policy.bootstrap_batches", "policy.times_at_32", "store.rule._target_"),
+        *("policy.bootstrap_batches", "policy.times_at_32", "policy.stored_alone"),
+        "store.rule._target_",
     ),
+    "stored_alone": ("reuse", "policy.stored_alone"),
     "large_images": ("resolution", "start"),
     "small_batches": ("sampler", "chains"),
 }
 """The group that each part of ours belongs to, and which of its keys it changes."""
-OF_OURS_ALONE = {"emission_as_radiance", "relative_positions"}
-"""Parts that the paper's network has no place for."""
+OF_OURS_ALONE = {"emission_as_radiance", "relative_positions", "stored_alone"}
+"""Parts that the paper's network or reuse has no place for."""
 ALSO_CHANGED = {
     "paper_with/muon": {"optimizer.lr"},
     "paper_with/denoised_targets": {"data.camera", "data.centred"},  # said to be as they are
