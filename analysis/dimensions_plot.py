@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import matplotlib
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from analysis.claims import CLAIMS, SALONS
-from analysis.curves import common_times, error_curve
+from analysis.curves import common_times, finite_points, mean_curve
 from analysis.methods import title
 from analysis.pairs import pair_runs
 from analysis.plots import STYLE, add_legend, draw_band, new_figure, save_figure
@@ -74,27 +72,25 @@ def _draw(axes: Axes, runs: Sequence[Run], key: str, claim: str) -> None:
     colours = matplotlib.colormaps["viridis"](np.linspace(0, 0.85, len(salons)))
     for salon, colour in zip(salons, colours, strict=True):
         pairs = pair_runs(runs, salon, *COMPARED[claim])
-        differences = [_difference(pair.better, pair.worse, key) for pair in pairs]
-        curve = error_curve(differences, key, signed=True)
+        whole = [p for p in pairs if not (p.better.diverged("hard") or p.worse.diverged("hard"))]
+        diverged = len(pairs) - len(whole)
+        differences = [_difference(pair.better, pair.worse, key) for pair in whole]
+        curve = mean_curve(differences, signed=True)
         if curve is not None:
-            draw_band(axes, curve, label=salon, color=matplotlib.colors.to_hex(colour))
+            label = f"{salon} ({diverged} diverged)" if diverged else salon
+            draw_band(axes, curve, label=label, color=matplotlib.colors.to_hex(colour))
     axes.axhline(0, color="#666666", linewidth=0.8)
 
 
-def _difference(better: Run, worse: Run, key: str) -> Run:
-    """The better run with the worse one's error minus its own as its history.
+def _difference(better: Run, worse: Run, key: str) -> np.ndarray:
+    """[times, 2] run seconds, and the worse run's error minus the better one's.
 
-    It has the better run's evaluations, as far as both runs' times reach and at the ends of that;
+    They are the better run's evaluations, as far as both runs' times reach and at the ends of that;
     errors between evaluations are interpolated linearly.
     """
-    ours, theirs = (
-        run.history[["run_seconds", key]].dropna().to_numpy(dtype=float)
-        if key in run.history
-        else np.empty((0, 2))
-        for run in (better, worse)
-    )
+    ours, theirs = (finite_points(run, key) for run in (better, worse))
     if not len(ours) or not len(theirs):
-        return replace(better, history=pd.DataFrame({"run_seconds": [], key: []}))
+        return np.empty((0, 2))
     times = common_times([ours, theirs])
     difference = np.interp(times, *theirs.T) - np.interp(times, *ours.T)
-    return replace(better, history=pd.DataFrame({"run_seconds": times, key: difference}))
+    return np.stack([times, difference], axis=1)

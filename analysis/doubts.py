@@ -9,7 +9,7 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.runs import Run
+from analysis.runs import SETS, Run
 
 MOST_TIME_APART = 0.05
 """Relative difference of run times up to which runs count as given the same time."""
@@ -25,11 +25,17 @@ def _shown(seconds: float) -> str:
 def comparison_warnings(runs: Sequence[Run]) -> list[str]:
     """What makes a comparison doubtful without forbidding it, a line each.
 
-    Trained runs of one scene whose run times are more than 5 % apart, runs of which some counted
-    measured costs instead of the wall clock's seconds, runs of different commits, of changed files,
-    of different machines, and of one method and scene with different settings.
+    Runs that ended with errors that are not finite, trained runs of one scene whose run times are
+    more than 5 % apart, runs of which some counted measured costs instead of the wall clock's
+    seconds, runs of different commits, of changed files, of different machines, and of one method
+    and scene with different settings.
     """
     warnings = _of_different_settings(runs)
+    if diverged := [str(run.folder) for run in runs if any(map(run.diverged, SETS))]:
+        warnings.append(
+            f"{len(diverged)} run(s) ended with errors that are not finite; curves and times to "
+            f"equal error are without them: {', '.join(diverged)}"
+        )
     for scene in sorted({run.scene for run in runs}):
         trained = [run for run in runs if run.scene == scene and run.result["steps"]]
         if not trained:

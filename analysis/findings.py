@@ -90,11 +90,16 @@ def histogram_follows_target(runs: Sequence[Run], ours: Methods = PAPERS) -> lis
 
 
 def error_still_falls(runs: Sequence[Run], ours: Methods = PAPERS) -> list[Finding]:
-    """Change of the error (geometric mean of the hard metrics) in the second half of the run."""
+    """Change of the error (geometric mean of the hard metrics) in the second half of the run.
+
+    NaN, and inconclusive, where a run diverged.
+    """
     of_scene = _runs_of(runs, "bedroom", ours.get(METHOD, METHOD))
     changes = []
-    for series in log_error_series(of_scene):
-        if len(series) > 1:
+    for run, series in zip(of_scene, log_error_series(of_scene), strict=True):
+        if run.diverged("hard"):
+            changes.append(math.nan)
+        elif len(series) > 1:
             seconds, errors = series.T
             changes.append(errors[-1] - np.interp(seconds[-1] / 2, seconds, errors))
     if not changes:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -93,25 +92,18 @@ def _styles(tables: Iterable[pd.DataFrame]) -> dict[str, dict[str, Any]]:
 def _panel(
     axes: Axes, runs: Mapping[str, Sequence[Run]], styles: Mapping[str, dict[str, Any]]
 ) -> None:
-    values = []
-    with_errors = iter(_with_one_error([run for seeds in runs.values() for run in seeds]))
+    """Curves of the geometric mean of the metrics that all runs have, on hard frames."""
+    values = [np.empty(0)]
+    series = iter(log_error_series([run for seeds in runs.values() for run in seeds]))
     for part, seeds in runs.items():
-        curve = error_curve([*islice(with_errors, len(seeds))], "error")
+        whole = [errors for errors in islice(series, len(seeds)) if len(errors)]
+        curve = mean_curve([np.stack([each[:, 0], np.exp(each[:, 1])], axis=1) for each in whole])
         if curve is None:
             continue
         values.append(curve.mean)
         style = {"label": title(part), **styles[part]} if part in styles else {"color": "#c4c4c4"}
         axes.plot(curve.seconds, curve.mean, **{"marker": ".", "linewidth": 1.2, **style})
     make_logarithmic(axes, "y", np.concatenate(values))
-
-
-def _with_one_error(runs: Sequence[Run]) -> list[Run]:
-    """The runs with the geometric mean of the metrics that all have, on hard frames, as history."""
-    histories = [
-        pd.DataFrame({"run_seconds": series[:, 0], "error": np.exp(series[:, 1])})
-        for series in log_error_series(runs)
-    ]
-    return [replace(run, history=history) for run, history in zip(runs, histories, strict=True)]
 
 
 @errors_in_a_line

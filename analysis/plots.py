@@ -168,6 +168,7 @@ def _draw(axes: Axes, panel: ErrorPanel, styles: Mapping[str, dict[str, Any]]) -
         curves.append(curve)
         seeds = "1 seed" if curve.n == 1 else f"{curve.n} seeds"
         draw_band(axes, curve, label=f"{title(method)} ({seeds})", **styles[method])
+        seeds += f", {curve.diverged} diverged" if curve.diverged else ""
     if not curves:
         axes.text(0.5, 0.5, "not measured", transform=axes.transAxes, ha="center", va="center")
         axes.set(xticks=[], yticks=[])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -60,6 +61,11 @@ class Run:
         """
         last = {key: self.result.get(key) for key in ("commit", "dirty")}
         return self.result.get("commits") or [last]
+
+    def diverged(self, set_name: str) -> bool:
+        """Whether its last errors on a set are not finite: MAPE, which all have, tells."""
+        errors = self.history.get(f"{set_name}_mape")
+        return errors is not None and not math.isfinite(float(errors.iloc[-1]))
 
     def metric(self, set_name: str, metric: str, statistic: str = "mean") -> float | None:
         """One metric at the end of the run; statistic is mean, worst5 or floor; None if missing.

@@ -89,7 +89,7 @@ def _consequence(result: ComparisonResult) -> str:
 
 def _finding_in_words(finding: Finding) -> str:
     text = f"{finding.text[0].upper()}{finding.text[1:]}: "
-    text += "not measured" if math.isnan(finding.value) else f"{finding.value:+.3g}"
+    text += "not measured, or not finite" if math.isnan(finding.value) else f"{finding.value:+.3g}"
     if finding.low is not None and finding.high is not None:
         text += f" (95 % interval {finding.low:+.3g} to {finding.high:+.3g})"
     return f"{text}; {finding.verdict}."

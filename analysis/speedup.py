@@ -23,15 +23,19 @@ def log_error_series(runs: Sequence[Run], *, over: str = "run_seconds") -> list[
     over: the column of `Run.history` that counts in place of run seconds, 'step' for one
 
     The metrics are those that every run has; evaluations with an error that is not finite and
-    positive are left out.
+    positive are left out, and all of a run that ends with one that is not finite.
     """
+    whole = [run for run in runs if not run.diverged("hard")]
     keys = [
         key
         for key in (f"hard_{metric}" for metric in METRICS)
-        if all(key in run.history and run.history[key].notna().any() for run in runs)
+        if all(key in run.history and run.history[key].notna().any() for run in whole)
     ]
     series = []
     for run in runs:
+        if run.diverged("hard"):
+            series.append(np.empty((0, 2)))
+            continue
         errors = run.history[keys].to_numpy(dtype=float)
         usable = (np.isfinite(errors) & (errors > 0)).all(axis=1) & bool(keys)
         times = run.history[over].to_numpy(dtype=float)[usable]
@@ -62,7 +66,7 @@ def time_ratio(pairs: Sequence[Pair]) -> TimeRatio | None:
     """Run times to the error with which the worse run of each pair ends: worse over better.
 
     Per seed, then the geometric mean over seeds with Student's 95 % interval of the logarithms.
-    None where a pair's curves do not give it.
+    None where a pair's curves do not give it, as those of a run that diverged.
     """
     found = [_of_pair(pair) for pair in pairs]
     known = [pair for pair in found if pair is not None]

@@ -29,7 +29,7 @@ def differences(run: Run, baseline: Run) -> tuple[float, float, float] | None:
     """Part of the baseline's steps, and log error less the baseline's at both ends and after as
     many steps, which are those of the shorter run.
 
-    None for what is not trained, and for a run that was not evaluated.
+    None for what is not trained, and for a run that was not evaluated, or diverged.
     """
     series = log_error_series([run, baseline], over="step")
     own, its = (one[one[:, 0] > 0] for one in series)

@@ -41,6 +41,10 @@ for scene in sorted({run.scene for run in runs}):
     parts, differences = [], []
     for ours, theirs in both:
         curve, end = log_error_series([ours, theirs])
+        if not (len(curve) and len(end)):  # one diverged
+            parts.append((np.nan, False))
+            differences.append(np.nan)
+            continue
         seconds, bound = time_to_stay_below(curve, end[-1, 1])
         parts.append((seconds / end[-1, 0], bound))
         differences.append(100 * (np.exp(curve[-1, 1] - end[-1, 1]) - 1))

@@ -45,6 +45,31 @@ def test_one_seed_and_a_mean_of_zero_have_no_band() -> None:
         assert np.array_equal(curve.high, curve.mean)
 
 
+@pytest.mark.parametrize("bad", [(0.4, math.nan, math.nan), (math.nan,) * 3, (0.4, 0.3, math.inf)])
+def test_a_seed_that_diverged_is_left_out_and_counted(bad) -> None:
+    curve = error_curve([run(0.8, 0.4, 0.2), run(*bad), run(0.6, 0.2, 0.1)], "hard_mape")
+    assert curve is not None
+    assert curve.seconds.tolist() == [10.0, 20.0, 30.0]
+    assert curve.mean.tolist() == pytest.approx([0.7, 0.3, 0.15])
+    assert (curve.n, curve.diverged) == (2, 1)
+
+
+def test_the_legend_says_how_many_seeds_diverged(make_run, tmp_path) -> None:
+    for seed in range(3):
+        file = make_run(seed=seed) / "metrics.csv"
+    table = pd.read_csv(file)
+    table.loc[len(table) - 1, [name for name in table if name.startswith("hard")]] = math.nan
+    table.to_csv(file, index=False)
+    runs = name_methods(find_runs(tmp_path / "runs")[0])
+    rows = [scene_panels(runs, set_name) for set_name in ("hard", "uniform")]
+    hard, uniform = (
+        axes.get_legend_handles_labels()[1][0]
+        for axes in error_figure(rows, method_styles(runs)).axes[:: len(rows[0])]
+    )
+    assert hard.endswith("(2 seeds, 1 diverged)")
+    assert uniform.endswith("(3 seeds)")
+
+
 def test_band_of_differences_is_the_interval_of_the_mean_on_both_sides_of_zero() -> None:
     values = [-0.02, 0.05, -0.01]
     curve = error_curve([run(value) for value in values], "hard_mape", signed=True)

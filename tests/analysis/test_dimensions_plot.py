@@ -42,6 +42,23 @@ def test_curves_are_the_uniform_error_less_that_of_exploration(make_method, tmp_
     )
 
 
+def test_a_pair_of_which_a_run_diverged_is_left_out_and_said_so(make_method, tmp_path) -> None:
+    for seed in range(3):
+        for method, error in {"ours_exploring": 0.05, "ours_uniform": 0.2}.items():
+            file = make_method(method, scene="salon-7", seed=seed, error=error) / "metrics.csv"
+    whole = find_runs(tmp_path)[0]
+    history = pd.read_csv(file)
+    history.loc[2:, [name for name in history if name.startswith("hard")]] = np.nan
+    history.to_csv(file, index=False)
+    runs = find_runs(tmp_path)[0]
+    (expected, found) = (
+        dimensions_figure(of, ["mae"], "ours_dimensions").axes[0].lines[0]
+        for of in ([run for run in whole if run.seed < 2], runs)
+    )
+    assert found.get_label() == "salon-7 (1 diverged)"
+    np.testing.assert_array_equal(found.get_xydata(), expected.get_xydata())
+
+
 @pytest.mark.parametrize("longer", ["ours_exploring", "ours_uniform"])
 def test_curves_reach_to_where_both_runs_end(make_method, tmp_path, longer) -> None:
     for method in ("ours_exploring", "ours_uniform"):

@@ -1,7 +1,9 @@
 """What is said of runs that can be compared, but whose comparison is doubtful."""
 
+import math
 import shutil
 
+import pandas as pd
 import pytest
 
 from analysis.doubts import comparison_warnings
@@ -72,6 +74,17 @@ def test_commits_that_changed_nothing_of_the_program_are_said_to_be_such(
         make_run(seed=seed, change=set_value("commits", value=[version]))
     (commits,) = comparison_warnings(find_runs(tmp_path)[0])
     assert commits.endswith("; the program itself is the same")
+
+
+def test_runs_that_diverged_are_named(make_run, tmp_path) -> None:
+    for seed in range(3):
+        folder = make_run(seed=seed)
+    table = pd.read_csv(folder / "metrics.csv")
+    table.loc[len(table) - 1, "uniform_mape"] = math.inf
+    table.to_csv(folder / "metrics.csv", index=False)
+    (warning,) = comparison_warnings(find_runs(tmp_path)[0])
+    assert warning.startswith("1 run(s) ended with errors that are not finite")
+    assert warning.endswith(f": {folder}")
 
 
 def test_runs_of_one_method_with_other_settings_are_a_doubt(make_run, tmp_path) -> None:

@@ -81,6 +81,17 @@ def test_error_still_falls_in_the_second_half(make_method, tmp_path, rate, verdi
     assert finding.verdict is verdict
 
 
+def test_a_run_that_diverged_leaves_open_whether_the_error_falls(make_method, tmp_path) -> None:
+    for seed in range(3):
+        file = make_method("active_exploration", scene="bedroom", seed=seed) / "metrics.csv"
+    history = pd.read_csv(file)
+    history.loc[len(history) - 1, [name for name in history if name.startswith("hard")]] = np.nan
+    history.to_csv(file, index=False)
+    (finding,) = error_still_falls(find_runs(tmp_path)[0])
+    assert math.isnan(finding.value)
+    assert finding.verdict is Verdict.INCONCLUSIVE
+
+
 def test_chess_is_compared_with_the_worst_scene_and_its_start(make_method, tmp_path) -> None:
     for seed in range(3):
         make_method("active_exploration", scene="chess", seed=seed, error=0.1)

@@ -132,6 +132,22 @@ def test_other_runs_are_left_out_and_two_of_one_kind_refused(folder, make_method
         errors_of(find_runs(folder)[0])
 
 
+def test_a_run_that_diverged_takes_no_curve_away(make_method, tmp_path) -> None:
+    for seed in range(2):
+        file = make_method("ours", scene="box", seed=seed) / "metrics.csv"
+    whole = find_runs(tmp_path)[0]
+    table = pd.read_csv(file)
+    for start in (4, 0):
+        table.loc[start:, [name for name in table if name.startswith("hard")]] = np.nan
+        table.to_csv(file, index=False)
+        axes = Figure().subplots()
+        parts_plot._panel(axes, {"": find_runs(tmp_path)[0]}, {})
+        parts_plot._panel(axes, {"": whole[:1]}, {})
+        found, expected = axes.lines
+        np.testing.assert_array_equal(found.get_xydata(), expected.get_xydata())
+    parts_plot._panel(Figure().subplots(), {"": find_runs(tmp_path)[0][1:]}, {})
+
+
 def test_runs_without_a_whole_method_are_refused(folder, tmp_path, monkeypatch, capsys) -> None:
     runs = [run for run in find_runs(folder)[0] if run.label["method"] != "active_exploration"]
     with pytest.raises(ValueError, match="no runs of active_exploration with its parts"):

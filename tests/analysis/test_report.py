@@ -1,3 +1,4 @@
+import math
 import os
 import subprocess
 import sys
@@ -250,7 +251,10 @@ def test_curve_averages_seeds_at_common_times() -> None:
 def test_curve_without_values_or_common_times_is_none() -> None:
     run = run_with([(0.0, 1.0), (1.0, 0.5)])
     assert error_curve([run], "hard_lpips") is None
-    assert error_curve([run, run_with([(0.0, None)])], "hard_mape") is None
+    lacking = Run(Path(), {}, run.history.assign(hard_lpips=None))
+    assert error_curve([run, lacking], "hard_lpips") is None
+    assert error_curve([lacking], "hard_lpips") is None
+    assert error_curve([run_with([(0.0, math.nan)])], "hard_mape") is None
     assert error_curve([run, run_with([(5.0, 1.0)])], "hard_mape") is None
 
 

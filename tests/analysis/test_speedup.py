@@ -84,6 +84,13 @@ def test_evaluations_that_failed_are_left_out(ratio, bad) -> None:
     assert found.value == pytest.approx(1.0)
 
 
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+@pytest.mark.parametrize("which", [0, 1])
+def test_a_run_that_diverged_has_no_time_to_equal_error(ratio, which, bad) -> None:
+    curves = ([1.0, 0.5, bad], [1.0, 0.8, 0.6])
+    assert ratio((curves[which], curves[1 - which])) is None
+
+
 def test_scenes_are_averaged_geometrically() -> None:
     two, eight = (TimeRatio(value, None, None, "") for value in (2.0, 8.0))
     assert time_ratio_over_scenes([two, eight]) == TimeRatio(pytest.approx(4.0), None, None, "")
