@@ -68,15 +68,22 @@ def difference_over_scenes(
 
 
 def shared_columns(metrics: pd.DataFrame) -> pd.DataFrame:
-    """Those columns that all rows have which have any: without weights some lack LPIPS."""
-    lacking = metrics.isna() & metrics.notna().any(axis=1).to_numpy()[:, None]
-    return metrics.loc[:, ~lacking.any()]
+    """Those columns that all rows have which have any: without weights some lack LPIPS.
+
+    Rows with an Inf, of runs that diverged, say nothing of that: their NaN was measured.
+    """
+    telling = metrics.notna().any(axis=1) & ~_diverged(metrics)
+    return metrics.loc[:, ~metrics[telling].isna().any()]
 
 
 def mean_of_shared(metrics: pd.DataFrame) -> pd.Series:
-    """[rows] geometric mean of `shared_columns`. NaN where a row has none, as one that diverged."""
+    """[rows] geometric mean of `shared_columns`; NaN where a row has none, or any Inf."""
     mean: pd.Series = np.exp(np.log(shared_columns(metrics)).mean(axis=1))
-    return mean
+    return mean.mask(_diverged(metrics))
+
+
+def _diverged(metrics: pd.DataFrame) -> pd.Series:
+    return metrics.isin([math.inf]).any(axis=1)
 
 
 def _relative_differences(

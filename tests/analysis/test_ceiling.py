@@ -34,7 +34,12 @@ def test_runs_with_and_without_lpips_are_compared_by_what_all_have(tmp_path: Pat
     """Its weights may come while a study goes on; of a run that diverged there are no metrics."""
     rows = [
         dict(zip((*METRICS, "error"), numbers, strict=True))
-        for numbers in ([2.0, 4, 8, 64, 8], [2, 4, 8, None, 4], [None] * 5)
+        for numbers in (
+            [2.0, 4, 8, 64, 8],
+            [2, 4, 8, None, 4],
+            [None] * 5,
+            [np.inf, None, np.inf, None, np.inf],
+        )
     ]
     for seed, row in enumerate(rows):
         run = dict(zip(RUN, ("room", 64, 400, "uniform", seed), strict=True))
@@ -46,13 +51,13 @@ def test_runs_with_and_without_lpips_are_compared_by_what_all_have(tmp_path: Pat
         )
     (tmp_path / "runs/1.csv").rename(tmp_path / "later")
     complete = read_runs(tmp_path)
-    assert complete["hard_error"].tolist() == pytest.approx([8, np.nan], nan_ok=True)
+    assert complete["hard_error"].tolist() == pytest.approx([8, np.nan, np.nan], nan_ok=True)
     mean = "The error is the geometric mean of MAPE, DSSIM, MAE"
     assert metrics_counted(complete) == f"{mean}, LPIPS."
     (tmp_path / "later").rename(tmp_path / "runs/1.csv")
     for frames in ("hard", "uniform"):
         found = read_runs(tmp_path)[f"{frames}_error"]
-        assert found.tolist() == pytest.approx([4, 4, np.nan], nan_ok=True)
+        assert found.tolist() == pytest.approx([4, 4, np.nan, np.nan], nan_ok=True)
     assert main([str(tmp_path)]) == 0
     told = (tmp_path / "tables.md").read_text()
     assert told.startswith(f"{mean}; not all runs have the others.")

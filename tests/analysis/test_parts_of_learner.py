@@ -66,6 +66,15 @@ def test_a_metric_that_a_run_lacks_counts_for_none() -> None:
     assert found == effect(of_three, "small_steps")
 
 
+def test_a_run_that_diverged_takes_no_metric_from_the_others() -> None:
+    results = ablation()
+    results.loc[3, [f"hard_{metric}" for metric in METRICS]] = [np.inf, np.nan, np.inf, np.nan]
+    errors = errors_by_part(results, "ours")
+    assert np.isnan(errors.loc["big_steps", ("box", 0)])
+    errors.loc["big_steps", ("box", 0)] = 0.12
+    pd.testing.assert_frame_equal(errors, errors_by_part(ablation(), "ours"))
+
+
 def test_effects_are_paired_by_scene_and_seed() -> None:
     errors = errors_by_part(ablation(), "ours")
     found = effect_on("box", errors, "big_steps")
@@ -123,15 +132,6 @@ def test_curves_of_parts_are_of_the_metrics_that_all_runs_have(make_method, tmp_
     np.testing.assert_array_equal(whole.get_ydata(), part.get_ydata())
 
 
-def test_other_runs_are_left_out_and_two_of_one_kind_refused(folder, make_method) -> None:
-    here = errors_of(find_runs(folder)[0])
-    make_method("ours_exploring", scene="box")
-    assert errors_of(find_runs(folder)[0]).equals(here)
-    make_method("ours", scene="box", budget="small")
-    with pytest.raises(ValueError, match="two runs of ours on box with seed 0"):
-        errors_of(find_runs(folder)[0])
-
-
 def test_a_run_that_diverged_takes_no_curve_away(make_method, tmp_path) -> None:
     for seed in range(2):
         file = make_method("ours", scene="box", seed=seed) / "metrics.csv"
@@ -146,6 +146,15 @@ def test_a_run_that_diverged_takes_no_curve_away(make_method, tmp_path) -> None:
         found, expected = axes.lines
         np.testing.assert_array_equal(found.get_xydata(), expected.get_xydata())
     parts_plot._panel(Figure().subplots(), {"": find_runs(tmp_path)[0][1:]}, {})
+
+
+def test_other_runs_are_left_out_and_two_of_one_kind_refused(folder, make_method) -> None:
+    here = errors_of(find_runs(folder)[0])
+    make_method("ours_exploring", scene="box")
+    assert errors_of(find_runs(folder)[0]).equals(here)
+    make_method("ours", scene="box", budget="small")
+    with pytest.raises(ValueError, match="two runs of ours on box with seed 0"):
+        errors_of(find_runs(folder)[0])
 
 
 def test_runs_without_a_whole_method_are_refused(folder, tmp_path, monkeypatch, capsys) -> None:
