@@ -11,6 +11,7 @@ from typing import Any
 import pandas as pd
 
 from analysis.command import errors_in_a_line
+from analysis.files import write
 from analysis.runs import METRICS, SETS
 from analysis.statistics import (
     Estimate,
@@ -179,12 +180,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     output = arguments.output or arguments.folder
     output.mkdir(parents=True, exist_ok=True)
     found = differences(runs)
-    runs.to_csv(output / "runs.csv", index=False, float_format="%.6g")
-    found.to_csv(output / "differences.csv", index=False, float_format="%.4g")
+    write(output / "runs.csv", runs.to_csv(index=False, float_format="%.6g"))
+    write(output / "differences.csv", found.to_csv(index=False, float_format="%.4g"))
     errors = () if found.empty else found["error"].unique()  # of uniform choice alone
     tables = [*(table(found, error) for error in errors), concentration(runs)]
     text = "\n\n".join([metrics_counted(runs), *map(to_markdown, tables)]) + "\n"
-    (output / "tables.md").write_text(text)
+    write(output / "tables.md", text)
     print(text)
     return 0
 

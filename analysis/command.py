@@ -13,6 +13,7 @@ P = ParamSpec("P")
 def errors_in_a_line(main: Callable[P, int]) -> Callable[P, int]:
     """The entry point, which ends with status 1 and a line where it raises OSError or ValueError.
 
+    After Ctrl-C with 130, and nothing said, as all of the program does.
     BrokenPipeError is passed on: that nobody reads the output is not an error of what was given.
     """
 
@@ -25,5 +26,7 @@ def errors_in_a_line(main: Callable[P, int]) -> Callable[P, int]:
         except (OSError, ValueError) as error:
             print(f"error: {error}", file=sys.stderr)
             return 1
+        except KeyboardInterrupt:
+            return 130
 
     return command

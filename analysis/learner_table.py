@@ -18,6 +18,7 @@ from pathlib import Path
 import pandas as pd
 
 from analysis.command import errors_in_a_line
+from analysis.files import write
 from analysis.parts_of_frames import frames_table
 from analysis.parts_of_learner import parts_table
 from analysis.readme_table import between_markers, markdown_row
@@ -130,7 +131,7 @@ def main() -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     ).parse_args()
     for page in PAGES:
-        page.write_text(with_tables(page.read_text(), tables(page)))
+        write(page, with_tables(page.read_text(), tables(page)))
     return 0
 
 

@@ -18,7 +18,8 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from analysis.command import errors_in_a_line
-from analysis.curves import error_curve
+from analysis.curves import mean_curve
+from analysis.files import write
 from analysis.parts_of_learner import (
     ABLATIONS,
     OTHER_NAMES,
@@ -115,8 +116,8 @@ def main() -> int:
     runs, output = find_runs(Path(sys.argv[1]))[0], Path(sys.argv[2])
     picture = draw(runs)
     output.mkdir(parents=True, exist_ok=True)
-    (output / "parts.png").write_bytes(picture)
-    errors_of(runs).to_csv(output / "ablation.csv", index=False, float_format="%.6g")
+    write(output / "parts.png", picture)
+    write(output / "ablation.csv", errors_of(runs).to_csv(index=False, float_format="%.6g"))
     return 0
 
 

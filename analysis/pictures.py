@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 
 import matplotlib
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
+from analysis.files import write
 from analysis.methods import methods_in_order, title
 from analysis.runs import Run
 
@@ -80,8 +82,8 @@ def write_comparisons(runs: Sequence[Run], folder: Path) -> tuple[list[Path], li
     try:
         every.mkdir(parents=True, exist_ok=True)
         for frame in frames:
-            _sheet([frame]).save(every / f"hard_{frame.index:02d}.png")
-        _sheet(frames[:MOST_DIFFERENT]).save(overview)
+            write(every / f"hard_{frame.index:02d}.png", _sheet([frame]))
+        write(overview, _sheet(frames[:MOST_DIFFERENT]))
     except OSError as error:
         return [], [f"no comparison pictures of {scene}: {error}"]
     return [overview, every], []
@@ -113,8 +115,8 @@ def _frame_mapes(run: Run) -> dict[int, float]:
     return {frame["index"]: frame["mape"] for frame in frames if frame["set"] == "hard"}
 
 
-def _sheet(frames: Sequence[FrameOfMethods]) -> Image.Image:
-    """A row per frame, and below them what the error maps' colours mean."""
+def _sheet(frames: Sequence[FrameOfMethods]) -> bytes:
+    """PNG: a row per frame, and below them what the error maps' colours mean."""
     rows = [_row(frame) for frame in frames]
     legend_top = sum(row.height for row in rows) + _MARGIN
     sheet = Image.new(
@@ -127,7 +129,9 @@ def _sheet(frames: Sequence[FrameOfMethods]) -> Image.Image:
     first = frames[0]
     scale = error_scale(next(iter(first.runs.values())), first.index)
     _draw_error_scale(sheet, scale, legend_top)
-    return sheet
+    stream = BytesIO()
+    sheet.save(stream, "PNG")
+    return stream.getvalue()
 
 
 def _row(frame: FrameOfMethods) -> Image.Image:

@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, Locator, LogLocator, MaxNLocator, NullLocator
 
 from analysis.curves import Curve, error_curve
+from analysis.files import write
 from analysis.methods import methods_in_order, title
 from analysis.runs import FURTHER, METRICS, SETS, Run
 from analysis.tables import TITLES
@@ -84,7 +85,7 @@ def save_figure(figure: Figure, folder: Path, name: str) -> list[Path]:
     """Writes `<name>.png` and `<name>.svg` into `folder`, arranged alike; returns their paths."""
     paths = [folder / f"{name}.{suffix}" for suffix in _DATES]
     for path in paths:
-        path.write_bytes(figure_bytes(figure, path.suffix[1:]))
+        write(path, figure_bytes(figure, path.suffix[1:]))
         figure.set_layout_engine("none")  # it is arranged now, which takes as long as drawing it
     return paths
 
@@ -167,8 +168,8 @@ def _draw(axes: Axes, panel: ErrorPanel, styles: Mapping[str, dict[str, Any]]) -
             continue
         curves.append(curve)
         seeds = "1 seed" if curve.n == 1 else f"{curve.n} seeds"
-        draw_band(axes, curve, label=f"{title(method)} ({seeds})", **styles[method])
         seeds += f", {curve.diverged} diverged" if curve.diverged else ""
+        draw_band(axes, curve, label=f"{title(method)} ({seeds})", **styles[method])
     if not curves:
         axes.text(0.5, 0.5, "not measured", transform=axes.transAxes, ha="center", va="center")
         axes.set(xticks=[], yticks=[])

@@ -16,6 +16,7 @@ from pathlib import Path
 from analysis.claims import CLAIMS
 from analysis.command import errors_in_a_line
 from analysis.evidence import Verdict
+from analysis.files import write
 
 BEGIN = "<!-- claims: written by analysis.readme_table -->"
 BEGIN_WITH_OURS = "<!-- claims with ours: written by analysis.readme_table -->"
@@ -131,7 +132,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     *results, page = map(Path, arguments)
     reports = [report.read_text() for report in results]
-    page.write_text(with_tables(page.read_text(), *reports))
+    write(page, with_tables(page.read_text(), *reports))
     return 0
 
 

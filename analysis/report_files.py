@@ -15,6 +15,7 @@ from analysis.doubts import comparison_warnings
 from analysis.evidence import Verdict
 from analysis.exploration import exploration_table
 from analysis.exploration_plots import write_exploration_figures
+from analysis.files import write
 from analysis.films import film_tables
 from analysis.frame_times import frame_table
 from analysis.latex import to_latex
@@ -129,13 +130,13 @@ def _write_tables(
 ) -> list[Path]:
     csv, markdown, latex = (output / f"results.{suffix}" for suffix in ("csv", "md", "tex"))
     provenance = output / "provenance.csv"
-    to_frame(summaries).to_csv(csv, index=False)
-    provenance_frame(runs).to_csv(provenance, index=False)
+    write(csv, to_frame(summaries).to_csv(index=False))
+    write(provenance, provenance_frame(runs).to_csv(index=False))
     filled = [table for table in tables if table.rows]
     lines = "\n".join(f"- {note}" for note in notes)
-    markdown.write_text("\n\n".join([*map(to_markdown, filled), lines]) + "\n")
+    write(markdown, "\n\n".join([*map(to_markdown, filled), lines]) + "\n")
     package = r"% for documents with \usepackage{booktabs}"
-    latex.write_text("\n\n".join([package, *map(to_latex, filled)]) + "\n")
+    write(latex, "\n\n".join([package, *map(to_latex, filled)]) + "\n")
     return [csv, markdown, latex, provenance]
 
 

@@ -13,6 +13,7 @@ from analysis.exploration_map.curves import write_curves
 from analysis.exploration_map.heat_maps import REUSE, write_heat_maps
 from analysis.exploration_map.runs import ERRORS, read_table
 from analysis.exploration_map.tables import break_even_table, speedup_table, speedups
+from analysis.files import write
 from analysis.latex import to_latex
 from analysis.tables import to_markdown
 
@@ -26,13 +27,13 @@ def write_map(folder: Path, output: Path) -> list[Path]:
     found = speedups(table)
     output.mkdir(parents=True, exist_ok=True)
     csv, markdown, latex = (output / f"speedups.{suffix}" for suffix in ("csv", "md", "tex"))
-    found.to_csv(csv, index=False, float_format="%.4g")
+    write(csv, found.to_csv(index=False, float_format="%.4g"))
     tables = [
         make(found, error=error, reuse=reuse)
         for error, make, reuse in product(ERRORS, (speedup_table, break_even_table), REUSE)
     ]
-    markdown.write_text("\n\n".join(map(to_markdown, tables)) + "\n")
-    latex.write_text("\n\n".join(map(to_latex, tables)) + "\n")
+    write(markdown, "\n\n".join(map(to_markdown, tables)) + "\n")
+    write(latex, "\n\n".join(map(to_latex, tables)) + "\n")
     return [
         csv,
         markdown,

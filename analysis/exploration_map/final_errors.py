@@ -15,6 +15,7 @@ from analysis.exploration_map.heat_maps import cell_text
 from analysis.exploration_map.runs import BASE, OWN, SAMPLERS, SETTING, UNIFORM, read_table
 from analysis.exploration_map.speedup import Comparison
 from analysis.exploration_map.tables import knobs_of, setting_name
+from analysis.files import write
 from analysis.statistics import estimate, paired_difference
 from analysis.tables import Cell, Table, format_estimate, format_percent, to_markdown
 
@@ -133,7 +134,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         runs = [against(table, read_table(arguments.against)) for table in runs]
     tables = [final_errors(table) for table in runs]
     text = "\n\n".join(map(to_markdown, tables)) + "\n"
-    arguments.output.write_text(text)
+    write(arguments.output, text)
     print(text)
     return 0
 

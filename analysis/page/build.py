@@ -15,6 +15,7 @@ from markupsafe import Markup
 
 from analysis.dimensions_plot import COMPARED, claims_with_salons, dimensions_figure, salons_of_both
 from analysis.evidence import Verdict
+from analysis.files import write
 from analysis.frame_times import frame_table
 from analysis.page.images import Illustration, from_figure, from_files
 from analysis.page.sections import Styles, claim_section, scene_section
@@ -94,7 +95,7 @@ def write_page(
     # The style sheet is ours and goes into <style>, where nothing would be unescaped again.
     style = Markup(files("analysis.page").joinpath("style.css").read_text())
     template = environment.get_template("template.html")
-    file.write_text(template.render(style=style, **_context(contents, progress)))
+    write(file, template.render(style=style, **_context(contents, progress)))
 
 
 def _context(

@@ -19,7 +19,7 @@ def test_what_was_given_is_answered_in_a_line(
     assert said.out == ""
 
 
-@pytest.mark.parametrize("error", [BrokenPipeError, KeyError, KeyboardInterrupt])
+@pytest.mark.parametrize("error", [BrokenPipeError, KeyError])
 def test_everything_else_is_raised(error: type[BaseException]) -> None:
     @errors_in_a_line
     def main() -> int:
@@ -27,6 +27,15 @@ def test_everything_else_is_raised(error: type[BaseException]) -> None:
 
     with pytest.raises(error):
         main()
+
+
+def test_ctrl_c_is_answered_by_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    @errors_in_a_line
+    def main() -> int:
+        raise KeyboardInterrupt
+
+    assert main() == 130
+    assert capsys.readouterr() == ("", "")
 
 
 def test_arguments_and_status_are_those_of_the_command() -> None:
