@@ -2,7 +2,7 @@
 
 import io
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -46,10 +46,14 @@ def full_disk_named(path: Path) -> Iterator[None]:
 
 
 def write_atomically(
-    path: Path, content: bytes | memoryview, *, keep_old_as: Path | None = None
+    path: Path,
+    content: bytes | memoryview | Iterable[bytes],
+    *,
+    keep_old_as: Path | None = None,
 ) -> None:
     """Replaces a file so that a crash at any time leaves either the old content or the new one.
 
+    content: in one piece, or in pieces, which may be read from the old one meanwhile
     keep_old_as: gets the old content, in the same folder; a crash may leave just that, under that
         name. None: the old content goes.
 
@@ -60,7 +64,7 @@ def write_atomically(
     try:
         with full_disk_named(path):
             with partial.open("wb") as stream:
-                stream.write(content)
+                stream.writelines([content] if isinstance(content, bytes | memoryview) else content)
                 stream.flush()
                 os.fsync(stream.fileno())
             if keep_old_as is not None and path.exists():

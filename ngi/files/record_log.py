@@ -81,13 +81,21 @@ class RecordLog(GrowingFile[BinaryIO]):
                 size = dropped = 0
             else:
                 start = stream.tell()
-                steps = np.fromfile(stream, dtype)["step"]  # a record cut short is left out
+                steps = self._steps(dtype, start)
                 # What a power cut leaves may be zeros: only what ascends from the start counts.
                 good = (steps <= step) & (np.diff(steps, prepend=-1) > 0)
                 kept = int(np.logical_and.accumulate(good).sum())
                 size, dropped = start + dtype.itemsize * kept, len(steps) - kept
         os.truncate(self.path, size)
         return dropped
+
+    def _steps(self, dtype: np.dtype, start: int) -> np.ndarray:
+        """Of the records that begin at `start`; one cut short is left out."""
+        count = (self.path.stat().st_size - start) // dtype.itemsize
+        if not count:
+            return np.empty(0, int)
+        records = np.memmap(self.path, dtype, mode="r", offset=start, shape=(count,))
+        return np.array(records["step"])
 
     def _open(self, dtype: np.dtype) -> None:
         if self.path.exists():

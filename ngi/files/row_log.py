@@ -1,12 +1,16 @@
 """A CSV file that grows row by row and can be cut back to an earlier step."""
 
 import csv
-from collections.abc import Mapping
+import os
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TextIO
+from typing import BinaryIO, TextIO
 
 from ngi.files.durable import full_disk_named, write_atomically
 from ngi.files.growing_file import GrowingFile
+
+BLOCK = 1 << 16
+"""Bytes that are read at once from a log's end."""
 
 
 class RowLog(GrowingFile[TextIO]):
@@ -38,12 +42,15 @@ class RowLog(GrowingFile[TextIO]):
     @property
     def last_row(self) -> dict[str, str] | None:
         """The last whole one that is on the disk, as text; None where there is none."""
-        lines = self._lines()
-        if (column := _step_column(lines)) is None:
+        if not self.path.exists():
             return None
-        whole = (line for line in reversed(lines[1:]) if _step(line, column) is not None)
-        last = next(whole, None)
-        return None if last is None else next(csv.DictReader([lines[0], last]))
+        with self.path.open("rb") as stream:
+            header = stream.readline()
+            if (column := _step_column(header)) is None:
+                return None
+            rows = _lines_backwards(stream, until=stream.tell())
+            last = next((row for row in rows if _step(row, column) is not None), None)
+        return None if last is None else next(csv.DictReader([header.decode(), last.decode()]))
 
     @property
     def last_step(self) -> int:
@@ -57,20 +64,27 @@ class RowLog(GrowingFile[TextIO]):
         What a run did after its last checkpoint is done again.
         """
         self.close()
-        if not (lines := self._lines()):
+        if not self.path.exists() or not self.path.stat().st_size:
             return 0
-        kept = []
-        if (column := _step_column(lines)) is not None:
-            steps = [(_step(line, column), line) for line in lines[1:]]
-            kept = [lines[0], *(line for its, line in steps if its is not None and its <= step)]
-        write_atomically(self.path, "".join(kept).encode())
-        return len(lines) - len(kept)
+        dropped = 0
 
-    def _lines(self) -> list[str]:
-        if not self.path.exists():
-            return []
-        with self.path.open(newline="") as stream:
-            return stream.readlines()
+        def kept() -> Iterator[bytes]:
+            nonlocal dropped
+            with self.path.open("rb") as stream:
+                header = stream.readline()
+                if (column := _step_column(header)) is None:
+                    dropped = 1 + sum(1 for _ in stream)
+                    return
+                yield header
+                for line in stream:
+                    its = _step(line, column)
+                    if its is not None and its <= step:
+                        yield line
+                    else:
+                        dropped += 1
+
+        write_atomically(self.path, kept())
+        return dropped
 
     def _open(self, columns: list[str]) -> None:
         continued = self.path.exists() and self.path.stat().st_size > 0
@@ -89,16 +103,36 @@ class RowLog(GrowingFile[TextIO]):
             self._writer.writeheader()
 
 
-def _step_column(lines: list[str]) -> int | None:
+def _lines_backwards(stream: BinaryIO, *, until: int) -> Iterator[bytes]:
+    """Those of a file from its last one to the one that begins at a position.
+
+    They are read in blocks: logs of long runs have gigabytes.
+    """
+    end, rest = stream.seek(0, os.SEEK_END), b""
+    while end > until:
+        start = max(until, end - BLOCK)
+        stream.seek(start)
+        rest, *whole = (stream.read(end - start) + rest).splitlines(keepends=True)
+        yield from reversed(whole)
+        end = start
+    if rest:
+        yield rest
+
+
+def _step_column(header: bytes) -> int | None:
     """Where rows have their step; None where the header was cut short by a crash, too."""
-    header = next(csv.reader(lines[:1]), [])
-    return header.index("step") if "step" in header and lines[0].endswith("\n") else None
+    names = _fields(header)
+    return names.index("step") if "step" in names and header.endswith(b"\n") else None
 
 
-def _step(line: str, column: int) -> int | None:
+def _step(line: bytes, column: int) -> int | None:
     """Of a row; None for one cut short by a crash: it has no newline or step, and its numbers
     can't be trusted.
     """
-    fields = next(csv.reader([line.replace("\0", "")]), [])
-    whole = line.endswith("\n") and len(fields) > column and fields[column].isdigit()
+    fields = _fields(line.replace(b"\0", b""))
+    whole = line.endswith(b"\n") and len(fields) > column and fields[column].isdigit()
     return int(fields[column]) if whole else None
+
+
+def _fields(line: bytes) -> list[str]:
+    return next(csv.reader([line.decode(errors="replace")]), [])

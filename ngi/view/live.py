@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections import deque
 from collections.abc import Sequence
+from io import BytesIO
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -35,6 +36,10 @@ FIRST = -1.0
 HARDEST = 8
 KEPT_BATCHES = 60
 """Generated batches whose proposals are shown."""
+WHOLE = 1_000_000
+"""Bytes up to which a log is read as a whole; those of long runs have gigabytes."""
+PICKED = 1000
+"""Rows that are read of a larger one, about twice as many as are drawn."""
 
 
 class LiveView(Callback):
@@ -177,5 +182,15 @@ def first_images(radiance: Tensor) -> Tensor:
 
 
 def _rows(path: Path) -> pd.DataFrame:
-    """What of a log is on the disk."""
-    return pd.read_csv(path) if path.exists() and path.stat().st_size else pd.DataFrame()
+    """What of a log is on the disk; of one larger than `WHOLE`, `PICKED` rows far and wide."""
+    size = path.stat().st_size if path.exists() else 0
+    if size <= WHOLE:
+        return pd.read_csv(path) if size else pd.DataFrame()
+    with path.open("rb") as stream:
+        picked = [stream.readline()]
+        for place in np.linspace(stream.tell(), size, PICKED, endpoint=False):
+            stream.seek(int(place))
+            stream.readline()  # what is left of the row that begins before
+            if (row := stream.readline()).endswith(b"\n"):
+                picked.append(row)
+    return pd.read_csv(BytesIO(b"".join(picked)))

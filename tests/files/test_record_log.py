@@ -1,4 +1,5 @@
 import json
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -71,6 +72,19 @@ def test_what_a_crash_leaves_at_the_end_is_dropped(tmp_path: Path, tail: bytes) 
     RecordLog(path, description="").keep_until(10)
     write(path, range(4, 5)).close()
     assert steps_in(path) == [1, 2, 3, 4]
+
+
+def test_a_long_log_is_not_held_in_memory(tmp_path: Path) -> None:
+    log = RecordLog(tmp_path / "log.bin", description="")
+    for step in range(2000):
+        log.append({"step": step, "position": np.zeros(500)})
+    tracemalloc.start()
+    try:
+        assert log.keep_until(1989) == 10
+        assert tracemalloc.get_traced_memory()[1] < 1e6
+    finally:
+        tracemalloc.stop()
+    assert steps_in(log.path) == list(range(1990))
 
 
 def test_a_first_line_cut_short_is_written_again(tmp_path: Path) -> None:

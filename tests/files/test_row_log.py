@@ -1,8 +1,10 @@
+import tracemalloc
 from pathlib import Path
 
 import pandas as pd
 import pytest
 
+from ngi.files import row_log
 from ngi.files.row_log import RowLog
 
 
@@ -45,6 +47,38 @@ def test_a_line_cut_short_by_a_crash_is_dropped(tmp_path: Path) -> None:
     assert RowLog(path).last_step == 3
     RowLog(path).keep_until(10)
     assert pd.read_csv(path)["step"].tolist() == [1, 2, 3]
+
+
+@pytest.mark.parametrize("block", [1, 7, 1 << 16])
+def test_the_last_whole_row_is_found_wherever_blocks_end(
+    tmp_path: Path, monkeypatch, block
+) -> None:
+    path = tmp_path / "log.csv"
+    monkeypatch.setattr(row_log, "BLOCK", block)
+    write(path, range(1, 12)).close()
+    for tail in ("", "\n", "no step,at all\n", "\0" * 40, "12,0."):
+        path.write_text(path.read_text() + tail)
+        assert RowLog(path).last_row == {"step": "11", "loss": str(11 / 8), "note": "a,b"}
+    path.write_text("step,loss\n12,0.")
+    assert RowLog(path).last_row is None
+
+
+def test_a_long_log_is_not_held_in_memory(tmp_path: Path) -> None:
+    log, count = RowLog(tmp_path / "log.csv"), 50_000
+    with log.path.open("w") as stream:
+        stream.write("step,loss\n")
+        stream.writelines(f"{step},{'0' * 200}\n" for step in range(count))
+    tracemalloc.start()
+    try:
+        assert log.last_step == count - 1
+        assert log.keep_until(count - 11) == 10
+        assert tracemalloc.get_traced_memory()[1] < 1e6
+    finally:
+        tracemalloc.stop()
+    assert log.last_step == count - 11
+    assert log.path.stat().st_size == len("step,loss\n") + sum(
+        len(f"{step},\n") + 200 for step in range(count - 10)
+    )
 
 
 @pytest.mark.parametrize("header", ["\0\0\0\0", "lo", "step,lo", "\n"])

@@ -2,6 +2,7 @@
 
 import shutil
 import socket
+import tracemalloc
 from pathlib import Path
 from time import monotonic, sleep
 from types import SimpleNamespace
@@ -74,6 +75,27 @@ def test_losses_are_shown_however_large_they_are() -> None:
         for top in (2.0, 40.0)
     )
     assert (small != large).any()
+
+
+def test_a_long_log_is_not_read_as_a_whole(tmp_path: Path) -> None:
+    log, count = tmp_path / "steps.csv", 50_000
+    with log.open("w") as stream:
+        stream.write("step,loss_new,of another\n")
+        stream.writelines(f"{n},{n / 2},{'0' * 200}\n" for n in range(count))
+    tracemalloc.start()
+    try:
+        rows = live._rows(log)
+        assert tracemalloc.get_traced_memory()[1] < 3e6
+    finally:
+        tracemalloc.stop()
+    steps = rows["step"].to_numpy()
+    assert len(steps) == pytest.approx(1000, abs=1)
+    assert (rows["loss_new"] == steps / 2).all()
+    assert steps[0] < 10
+    assert steps[-1] > 0.998 * count
+    distances = np.diff(steps)
+    assert distances.min() > 0
+    assert distances.max() < 2.1 * distances.min()
 
 
 def test_a_run_that_has_just_begun_has_a_figure_too() -> None:
