@@ -126,6 +126,12 @@ class Parameters:
             node = self._parameters.hierarchy[node][0]
         return node is not None
 
+    def is_made_of(self, object_id: str, classes: Sequence[str]) -> bool:
+        """Whether an object, or a part of it, is of one of these classes of Mitsuba."""
+        owner = self.object(object_id)
+        nodes = (node for node in self._parameters.hierarchy if node.class_name() in classes)
+        return any(self.belongs_to(node, owner) for node in nodes)
+
     def shapes_in(self, group: mi.Object) -> int:
         """How many shapes with parameters are part of an object."""
         nodes = {node for _, _, node, _ in self._parameters.properties.values()}

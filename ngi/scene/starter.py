@@ -11,6 +11,7 @@ import numpy as np
 import yaml
 
 from ngi.machine.backend import mi
+from ngi.scene.kinds.appearance import PLASTICS
 from ngi.scene.scene_files import SceneFile, integrator_max_depth
 from ngi.scene.scene_parameters import EMISSIONS
 from ngi.scene.transforms import thickened
@@ -166,7 +167,10 @@ def _surface(bsdf: mi.BSDF) -> dict[str, str]:
     """By the names of the BSDF's parameters, as `ngi.scene.kinds.appearance` looks for them."""
     entries = {}
     parameters = mi.traverse(bsdf)
+    coated = any(node.class_name() in PLASTICS for node in parameters.hierarchy)
     for key in parameters.properties:
+        if coated and re.search(r"specular_reflectance\.\w+$", key):
+            continue  # it is the coat's
         if re.search(r"(reflectance|transmittance|base_color)\.value$", key):
             if np.size(parameters[key]) != 3:
                 continue  # one number: authored as <spectrum>, or left out

@@ -68,6 +68,27 @@ def two_sides(root) -> None:
     find(root, "white").append(other)
 
 
+def plastic(diffuse, coat):
+    """The edit that gives `clay` these reflectances."""
+
+    def edit(root) -> None:
+        clay = find(root, "clay")
+        clay.remove(clay.find("rgb"))
+        clay.extend(map(ElementTree.fromstring, (diffuse, coat)))
+
+    return edit
+
+
+WHITE = '<rgb name="{}_reflectance" value="1, 1, 1"/>'
+WOOD = (
+    '<texture type="bitmap" name="{}_reflectance"><string name="filename" value="plain.png"/>'
+    "</texture>"
+)
+CHEQUERED = '<texture type="checkerboard" name="diffuse_reflectance"/>'
+WOODEN = plastic(WOOD.format("diffuse"), WHITE.format("specular"))
+GRAINED_COAT = plastic(WHITE.format("diffuse"), WOOD.format("specular"))
+
+
 def nameless(root) -> None:
     second_camera(root)
     del find(root, "camera").attrib["id"]
@@ -123,6 +144,22 @@ def other_mesh(folder) -> None:
             {"edit": bumpy},
         ),
         ({"object": "picture", **ALBEDO}, "name a BSDF whose reflectance is given as <rgb>", {}),
+        ({"object": "clay", **ALBEDO}, "'clay' .* name a BSDF whose", {"edit": WOODEN}),
+        (
+            {"object": "clay", **ALBEDO},
+            "'clay' .* name a BSDF whose",
+            {"edit": plastic(CHEQUERED, WHITE.format("specular"))},
+        ),
+        (
+            {"object": "clay", "size": [4, 6], **TEXELS},
+            "'clay' .* name a BSDF whose .* is one bitmap",
+            {"edit": GRAINED_COAT},
+        ),
+        (
+            {**texture("stripes.png", "dots.png"), "object": "clay"},
+            "'clay' .* name a BSDF whose .* is one bitmap",
+            {"edit": GRAINED_COAT},
+        ),
         (
             {"object": "white", **ALBEDO},
             r"'white' \(TwoSided.*\) has several .*brdf_0.*brdf_1.*; give an id to the part",

@@ -27,6 +27,9 @@ _REFLECTANCES = (
     "reflectance",
 )
 
+PLASTICS = ("SmoothPlastic", "RoughPlastic")
+"""Whose albedo is their diffuse_reflectance: the specular one is that of the coat over it."""
+
 
 MOST_TEXELS = 2**16
 """Every one is a component of v, which is stored with every patch."""
@@ -45,7 +48,7 @@ class Albedo(RangedVariable):
     def bind_one(self, scene: LoadedScene, object_id: str) -> Write:
         key = scene.parameter(
             object_id,
-            tuple(f"{name}.value" for name in self.reflectances),
+            _reflectances(scene, object_id, "value", among=self.reflectances),
             hint="name a BSDF whose reflectance is given as <rgb>, not as a texture",
         )
         if (count := scene.read(key).size) != 3:
@@ -203,6 +206,14 @@ def most_materials(variables: Iterable[Variable]) -> int:
 def _bitmap(scene: LoadedScene, object_id: str) -> str:
     return scene.parameter(
         object_id,
-        tuple(f"{name}.data" for name in _REFLECTANCES),
+        _reflectances(scene, object_id, "data", among=_REFLECTANCES),
         hint="name a BSDF whose reflectance is one bitmap",
     )
+
+
+def _reflectances(
+    scene: LoadedScene, object_id: str, ending: str, *, among: tuple[str, ...]
+) -> tuple[str, ...]:
+    """What an object's albedo may be, as parameters with this ending."""
+    names = ("diffuse_reflectance",) if scene.is_made_of(object_id, PLASTICS) else among
+    return tuple(f"{name}.{ending}" for name in names)
