@@ -41,7 +41,8 @@ class ScalarTracer(Tracer):
             self._copy[key] = camera[key]
         self._copy.update()
         image = mi.render(self._scene, sensor=self._sensor, seed=seed, spp=samples)
-        result = torch.from_numpy(np.array(image, dtype=np.float32))
+        colours = np.array(image, dtype=np.float32)[..., :3]  # an `aov` adds its buffers
+        result = torch.from_numpy(colours)
         return lambda: result
 
     def buffers(self, pixels: Pixels, *, samples: int) -> Pending:

@@ -51,6 +51,9 @@ NamedFile = tuple[str, Path]
 
 MOST_INCLUDES = 100
 
+PATH_TRACERS = ("path", "volpath", "volpathmis")
+"""Mitsuba's integrators whose pictures can be trained on."""
+
 
 @dataclass(frozen=True)
 class SceneFile:
@@ -169,14 +172,11 @@ def file_references(
 def integrator_max_depth(scene: SceneFile) -> int:
     """The authored max_depth; Mitsuba's default, -1 for no limit, where none is given.
 
-    Raises ValueError for a scene without integrator, for a max_depth that is no integer, and for a
-    scene that hides emitters: the picture and the emission buffer must both show them.
+    Raises ValueError for a scene without integrator or with one that is no path tracer, for a
+    max_depth that is no integer, and for a scene that hides emitters: the picture and the emission
+    buffer must both show them.
     """
-    integrator = scene.root.find("integrator")
-    if integrator is None:
-        raise ValueError(f"{scene.path}: no <integrator>; add one, <integrator type='path'>")
-    while (inner := integrator.find("integrator")) is not None:  # in an 'aov', say
-        integrator = inner
+    integrator = _path_tracer(scene)
     hidden = integrator.find("boolean[@name='hide_emitters']")
     if hidden is not None and hidden.get("value", "").lower() == "true":
         raise ValueError(f"{scene.path}: hide_emitters is true, set it to false: emitters show")
@@ -191,6 +191,21 @@ def integrator_max_depth(scene: SceneFile) -> int:
             f"{scene.path}: the integrator's max_depth is '{value}'; expected an integer, the one "
             "in scene.yaml"
         ) from None
+
+
+def _path_tracer(scene: SceneFile) -> ElementTree.Element:
+    """The integrator, or the one in an `aov`."""
+    given = scene.root.find("integrator")
+    if given is None:
+        raise ValueError(f"{scene.path}: no <integrator>; add one, <integrator type='path'>")
+    inside = (each for each in given.iter("integrator") if each.get("type") != "aov")
+    integrator = next(inside, given)
+    if (kind := integrator.get("type")) not in PATH_TRACERS:
+        raise ValueError(
+            f"{scene.places.get(integrator, scene.path)}: <integrator type='{kind}'>: pictures are "
+            f"made by a path tracer here; take one of {', '.join(PATH_TRACERS)}"
+        )
+    return integrator
 
 
 def content_hash(contents: list[tuple[str, Path]]) -> str:

@@ -242,6 +242,20 @@ def test_bad_states(renderer, bad, resolution, message) -> None:
         renderer.render_patches(bad, resolution=resolution, seed=0)
 
 
+def test_a_picture_is_that_of_the_path_tracer_in_an_aov(box_folder, tmp_path) -> None:
+    shutil.copytree(box_folder, tmp_path, dirs_exist_ok=True)
+    xml = (tmp_path / "scene.xml").read_text()
+    begin, rest = xml.split('<integrator type="path">')
+    aov = '<integrator type="aov"><string name="aovs" value="a:albedo"/>'
+    inner = rest.replace("</integrator>", "</integrator></integrator>", 1)
+    pictures = []
+    for text in (xml, f'{begin}{aov}<integrator type="path" name="image">{inner}'):
+        (tmp_path / "scene.xml").write_text(text)
+        made = MitsubaRenderer(scene=read_scene(tmp_path), backend="scalar", patch_size=4)
+        pictures.append(made.render_image(V, resolution=8, samples_per_pixel=4, seed=1))
+    assert torch.equal(*pictures)
+
+
 def test_bad_construction(box_folder, tmp_path) -> None:
     with pytest.raises(ValueError, match="patch_size is 0"):
         MitsubaRenderer(scene=read_scene(box_folder), backend="scalar", patch_size=0)

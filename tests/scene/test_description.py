@@ -191,6 +191,19 @@ def test_merged_keys_may_be_overridden(tmp_path) -> None:
             'value="true"/></integrator></integrator><integrator type="path" name="unused">',
             "hide_emitters is true",
         ),
+        *(
+            (
+                '<integrator type="path">',
+                f'<integrator type="{kind}">',
+                rf"scene\.xml, line 4: <integrator type='{kind}'>: .*; take one of path, volpath",
+            )
+            for kind in ("direct", "depth", "ptracer", "prb", "moment", "aov")
+        ),
+        (
+            '<integrator type="path">',
+            '<integrator type="aov"><integrator type="depth"/></integrator><integrator type="a">',
+            "line 4: <integrator type='depth'>",
+        ),
         ("integrator", "x", "not well-formed XML"),
         (
             'name="max_depth" value="4"',
@@ -203,6 +216,12 @@ def test_bad_xml(box, old, new, message) -> None:
     edit(box, old, new, "scene.xml")
     with pytest.raises(ValueError, match=message):
         read_scene(box)
+
+
+@pytest.mark.parametrize("kind", ["volpath", "volpathmis"])
+def test_path_tracers_of_media_are_path_tracers(box, kind) -> None:
+    edit(box, 'type="path"', f'type="{kind}"', "scene.xml")
+    assert read_scene(box).max_depth == 4
 
 
 def test_no_folder(tmp_path) -> None:
