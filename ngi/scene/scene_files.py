@@ -177,10 +177,10 @@ def integrator_max_depth(scene: SceneFile) -> int:
     buffer must both show them.
     """
     integrator = _path_tracer(scene)
-    hidden = integrator.find("boolean[@name='hide_emitters']")
+    hidden = _given(integrator, "boolean", "hide_emitters", "hideEmitters")
     if hidden is not None and hidden.get("value", "").lower() == "true":
         raise ValueError(f"{scene.path}: hide_emitters is true, set it to false: emitters show")
-    depth = integrator.find("integer[@name='max_depth']")
+    depth = _given(integrator, "integer", "max_depth", "maxDepth")
     if depth is None:
         return -1
     value = depth.get("value", "")
@@ -191,6 +191,11 @@ def integrator_max_depth(scene: SceneFile) -> int:
             f"{scene.path}: the integrator's max_depth is '{value}'; expected an integer, the one "
             "in scene.yaml"
         ) from None
+
+
+def _given(integrator: ElementTree.Element, tag: str, *names: str) -> ElementTree.Element | None:
+    """A property by its name, or by that in files of versions before 1.0."""
+    return next((each for each in integrator.findall(tag) if each.get("name") in names), None)
 
 
 def _path_tracer(scene: SceneFile) -> ElementTree.Element:

@@ -224,6 +224,20 @@ def test_path_tracers_of_media_are_path_tracers(box, kind) -> None:
     assert read_scene(box).max_depth == 4
 
 
+def test_files_of_old_versions_of_mitsuba_have_other_names(box) -> None:
+    edit(box, 'version="3.0.0"', 'version="0.6.0"', "scene.xml")
+    edit(box, 'name="max_depth"', 'name="maxDepth"', "scene.xml")
+    assert read_scene(box).max_depth == 4
+    edit(
+        box,
+        "</integrator>",
+        '<boolean name="hideEmitters" value="true"/></integrator>',
+        "scene.xml",
+    )
+    with pytest.raises(ValueError, match="hide_emitters is true"):
+        read_scene(box)
+
+
 def test_no_folder(tmp_path) -> None:
     with pytest.raises(FileNotFoundError, match=r"nowhere.scene.yaml: no such file"):
         read_scene(tmp_path / "nowhere")
