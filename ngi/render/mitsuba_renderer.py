@@ -96,7 +96,7 @@ class MitsubaRenderer(Renderer):
         # Scenes of a sweep's finished jobs are left in cycles, and slow every launch down.
         gc.collect()
         self._scene = VariableScene(scene, arrange=needed_only)
-        require_perspective(self._scene.scene, path=scene.document.path)
+        require_perspective(self._scene.scene, document=scene.document)
         first_hit = first_hit_of(
             self._scene,
             needed_only=needed_only,

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from ngi.machine.backend import mi
 from ngi.render.materials import collect_materials
 from ngi.render.projection import require_perspective
+from ngi.scene.scene_files import SceneFile
 from ngi.scene.scene_parameters import has_surface
 
 
-def obstacles(scene: mi.Scene, *, path: Path) -> list[str]:
-    """What a renderer of this scene would say is wrong with it. path: of the scene's file"""
+def obstacles(scene: mi.Scene, *, document: SceneFile) -> list[str]:
+    """What a renderer of this scene, loaded from a document, would say is wrong with it."""
 
     def camera() -> None:
-        require_perspective(scene, path=path)
+        require_perspective(scene, document=document)
 
     def materials() -> None:
         collect_materials([shape.bsdf() for shape in scene.shapes() if has_surface(shape)])

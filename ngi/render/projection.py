@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ngi.machine.backend import mi
 from ngi.scene import transforms
+from ngi.scene.scene_files import SceneFile
 from ngi.scene.variable_scene import VariableScene
 
 
@@ -21,12 +20,13 @@ def require_told_camera(scene: VariableScene) -> None:
         )
 
 
-def require_perspective(scene: mi.Scene, *, path: Path) -> None:
-    """Raises ValueError where the camera is no perspective one with a whole square film.
+def require_perspective(scene: mi.Scene, *, document: SceneFile) -> None:
+    """Raises ValueError where the camera is no perspective one with a whole square film, and where
+    it stands in a medium.
 
-    path: of the scene's file
+    document: what the scene was loaded from
     """
-    sensor = scene.sensors()[0]
+    path, sensor = document.path, scene.sensors()[0]
     if sensor.class_name() != "PerspectiveCamera":
         raise ValueError(
             f"{path}: the camera is a {sensor.class_name()}; make it <sensor "
@@ -44,6 +44,18 @@ def require_perspective(scene: mi.Scene, *, path: Path) -> None:
             f"{path}: the film is {width} x {height}; make width and height equal, since the "
             "virtual image is a square"
         )
+    _require_no_medium(document)
+
+
+def _require_no_medium(document: SceneFile) -> None:
+    """Of the camera, as the file has it: Mitsuba does not tell it."""
+    media = {medium.get("id") for medium in document.root.iter("medium")}
+    for child in document.root.iterfind("sensor[1]/*"):
+        if child.tag == "medium" or (child.tag == "ref" and child.get("id") in media):
+            raise ValueError(
+                f"{document.places.get(child, document.path)}: the camera stands in a medium; take "
+                f"this <{child.tag}> out: paths begin in empty space here"
+            )
 
 
 class Projection:

@@ -20,7 +20,7 @@ from ngi.scene.variable_scene import VariableScene
 def describe_scene(description: SceneDescription) -> tuple[str, list[str]]:
     """A text about a variable scene, and what is wrong with it."""
     scene = VariableScene(description)
-    require_perspective(scene.scene, path=description.document.path)
+    require_perspective(scene.scene, document=description.document)
     lines = [
         f"{description.name}: {description.dimensions} dimensions, {description.document.path}",
         f"  {description.samples_per_pixel} samples per pixel, max_depth {description.max_depth}",
@@ -63,9 +63,8 @@ def describe_file(path: Path) -> str:
     lines += [f"  {name}: {', '.join(kinds)}" for name, kinds in properties.items()]
     if nameless:
         lines.append(f"  and {nameless} more object(s) without an id: give them one to vary them")
-    lines += [
-        f"  cannot be trained on as it is: {obstacle}" for obstacle in obstacles(scene, path=path)
-    ]
+    found_wrong = obstacles(scene, document=document)
+    lines += [f"  cannot be trained on as it is: {obstacle}" for obstacle in found_wrong]
     target = path.parent / "scene.yaml"
     if target.exists():
         lines += ["", f"{target} is there: describe its folder {path.parent}"]

@@ -280,3 +280,18 @@ def test_bad_construction(box_folder, tmp_path) -> None:
     (tmp_path / "scene.xml").write_text(xml.replace('type="roughplastic"', 'type="pplastic"'))
     with pytest.raises(ValueError, match="BSDF 'clay' is of kind"):
         MitsubaRenderer(scene=read_scene(tmp_path), backend="scalar")
+
+
+FOG = '<medium type="homogeneous" id="fog"/>'
+
+
+@pytest.mark.parametrize(("before", "inside"), [(FOG, '<ref id="fog"/>'), ("", FOG)])
+def test_a_camera_in_a_medium_is_refused(box_folder, tmp_path, before, inside) -> None:
+    """No picture would show it, the references neither."""
+    shutil.copytree(box_folder, tmp_path, dirs_exist_ok=True)
+    sensor = '<sensor type="perspective" id="camera">'
+    text = (tmp_path / "scene.xml").read_text()
+    assert sensor in text
+    (tmp_path / "scene.xml").write_text(text.replace(sensor, f"{before}{sensor}{inside}"))
+    with pytest.raises(ValueError, match=r"scene\.xml, line 7: the camera stands in a medium"):
+        MitsubaRenderer(scene=read_scene(tmp_path), backend="scalar")
