@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from xml.etree import ElementTree
 
-from ngi.scene.xml_file import Lines, read_xml
+from ngi.scene.xml_file import Lines, parse_xml, remove_defaults, replace_names
 
 ASSETS = "NGI_ASSETS"
 """Environment variable: further folders that scenes may read from, as in PATH."""
@@ -88,26 +88,48 @@ def read_scene_file(path: Path, *, within: Path | None = None) -> SceneFile:
     if not path.is_file():
         raise FileNotFoundError(f"{path}: no such scene file; check the key 'scene' in scene.yaml")
     within = within or path.parent
-    defaults: dict[str, str] = {}
+    root, lines = parse_xml(path)
+    places, home = element_places(path, lines), path.parent
+    folders: dict[ElementTree.Element, tuple[Path, ...]] = dict.fromkeys(lines, (home,))
     included: list[NamedFile] = []
-    root, lines = read_xml(path, defaults)
-    places = element_places(path, lines)
-    check_files(SceneFile(path, root), lines, within=within)
-    while (place := _first_include(root)) is not None:
-        parent, index = place
-        name = parent[index].get("filename", "")
+    defaults: dict[str, str] = {}
+    replace_names(root, defaults, place=places[root])
+    pending = [(root, child) for child in reversed(root)]
+    while pending:  # in document order, as Mitsuba: an included file may have <default>s too
+        parent, element = pending.pop()
+        replace_names(element, defaults, place=places[element])
+        if element.tag != "include":
+            pending += [(element, child) for child in reversed(element)]
+            continue
+        name = _found(element.get("filename", ""), folders[element], home=home)
         if len(included) >= MOST_INCLUDES:
             raise ValueError(f"{path}: <include> of '{name}': more than {MOST_INCLUDES}, or a loop")
-        file = path.parent / name
-        content, lines = read_xml(file, defaults)
+        where = f"{places[element]}: <include>"
+        included.append((name, allowed_file(home, name, within=within, where=where)))
+        content, lines = parse_xml(file := home / name)
         places |= element_places(file, lines)
-        for _, element, attribute in file_references(content):
-            below = os.path.relpath(file.parent / element.get(attribute, ""), path.parent)
-            element.set(attribute, below)
-        check_files(SceneFile(file, content), lines, within=within, folder=path.parent)
-        included.append((name, file))
+        folders |= dict.fromkeys(lines, (file.parent, *folders[element]))
+        index = list(parent).index(element)
         parent[index : index + 1] = list(content)
-    return SceneFile(path, root, tuple(included), places)
+        pending += [(parent, child) for child in reversed(content)]
+    remove_defaults(root)
+    for _, element, attribute in file_references(root):
+        name = _found(element.get(attribute, ""), (home, *folders[element]), home=home)
+        element.set(attribute, name)
+    scene = SceneFile(path, root, tuple(included), places)
+    check_files(scene, within=within)
+    return scene
+
+
+def _found(name: str, folders: tuple[Path, ...], *, home: Path) -> str:
+    """What an XML file names, as a name from the scene's folder, its home.
+
+    folders: where it is looked for, in turn. Mitsuba looks for an included file beside the one
+        that includes it, and so on outwards, but for any other file in the scene's folder alone;
+        what is not there, but beside the included file, is found as well.
+    """
+    folder = next((folder for folder in folders if os.path.isfile(folder / name)), home)
+    return name if folder == home else os.path.relpath(folder / name, home)
 
 
 def element_places(path: Path, lines: Lines) -> dict[ElementTree.Element, str]:
@@ -115,32 +137,19 @@ def element_places(path: Path, lines: Lines) -> dict[ElementTree.Element, str]:
     return {element: f"{path}, line {line}" for element, line in lines.items()}
 
 
-def _first_include(root: ElementTree.Element) -> tuple[ElementTree.Element, int] | None:
-    for parent in root.iter():
-        for index, child in enumerate(parent):
-            if child.tag == "include":
-                return parent, index
-    return None
-
-
-def check_files(
-    scene: SceneFile, lines: Lines, *, within: Path, folder: Path | None = None
-) -> None:
-    """Finds files that are not there, all of them, or must not be read.
-
-    folder: that they are named from, where it is not the file's own.
-    """
+def check_files(scene: SceneFile, *, within: Path) -> None:
+    """Finds files that are not there, all of them, or must not be read."""
     missing = []
     for tag, element, attribute in file_references(scene.root):
-        where = f"{scene.path}, line {lines[element]}: <{tag}>"
+        where = f"{scene.places[element]}: <{tag}>"
         name = element.get(attribute, "")
         try:
-            allowed_file(folder or scene.path.parent, name, within=within, where=where)
+            allowed_file(scene.path.parent, name, within=within, where=where)
         except FileNotFoundError as error:
             missing.append(str(error))
     if missing:
         raise FileNotFoundError("; ".join(missing))
-    for element, line in lines.items():
+    for element, place in scene.places.items():
         value, name = element.get("value", ""), element.get("name", "")
         if element.tag == "path":
             problem = "<path>: take it out; files are named from the folder of this one"
@@ -148,7 +157,7 @@ def check_files(
             problem = f"<string name='{name}'> is '{value}'; only 'filename' names a file"
         else:
             continue
-        raise ValueError(f"{scene.path}, line {line}: {problem}")
+        raise ValueError(f"{place}: {problem}")
 
 
 def named_files(scene: SceneFile) -> list[NamedFile]:

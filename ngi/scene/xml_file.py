@@ -14,15 +14,22 @@ Lines = dict[Element, int]
 """Where each element begins."""
 
 
-def read_xml(path: Path, defaults: dict[str, str] | None = None) -> tuple[Element, Lines]:
+def read_xml(path: Path) -> tuple[Element, Lines]:
+    """As `parse_xml`; every <default> is taken out, and its $name replaced in all attributes."""
+    root, lines = parse_xml(path)
+    defaults: dict[str, str] = {}
+    for element in root.iter():
+        replace_names(element, defaults, place=f"{path}, line {lines[element]}")
+    remove_defaults(root)
+    return root, lines
+
+
+def parse_xml(path: Path) -> tuple[Element, Lines]:
     """The root, and the line of every element; text between elements is left out.
 
-    Every <default> is taken out, and its $name replaced in all attributes. defaults: those of a
-    file that includes this one, which win; this one's are added.
-
     Raises ValueError, naming file and line, for broken XML, entities (a few lines of which can
-    stand for gigabytes, or for another file), and elements or $names nested without end; and
-    OSError for a file that cannot be read.
+    stand for gigabytes, or for another file), and elements nested without end; and OSError for a
+    file that cannot be read.
     """
     builder, parser = TreeBuilder(), expat.ParserCreate()
     lines: Lines = {}
@@ -55,9 +62,37 @@ def read_xml(path: Path, defaults: dict[str, str] | None = None) -> tuple[Elemen
         raise ValueError(f"{path}: not well-formed XML: {problem}; correct it there") from None
     except LookupError as problem:
         raise ValueError(f"{path}: {problem}; save it as UTF-8") from None
-    root = builder.close()
-    _replace_names(path, root, lines, {} if defaults is None else defaults)
-    return root, lines
+    return builder.close(), lines
+
+
+def replace_names(element: Element, defaults: dict[str, str], *, place: str) -> None:
+    """Replaces the $names in an element's attributes; of a <default>, takes note of its own.
+
+    Elements come in document order: a <default> may be made of those before it, which win.
+
+    Raises ValueError for $names nested without end. place: file and line, for its message.
+    """
+    for attribute, text in element.items():
+        if "$" not in text:
+            continue
+        names = "|".join(map(re.escape, sorted(defaults, key=len, reverse=True)))
+        parts = re.split(rf"\$({names})", text) if names else [text]
+        new = "".join(defaults[p] if i % 2 else p for i, p in enumerate(parts))
+        if len(new) > MOST_CHARACTERS:
+            raise ValueError(
+                f"{place}: {attribute} of <{element.tag}> becomes {len(new)} characters; $names "
+                f"may stand for {MOST_CHARACTERS}"
+            )
+        element.set(attribute, new)
+    if element.tag == "default":
+        defaults.setdefault(element.get("name", ""), element.get("value", ""))
+
+
+def remove_defaults(root: Element) -> None:
+    """Every <default>, which Mitsuba need not see once its name is replaced."""
+    for parent in list(root.iter()):
+        for default in parent.findall("default"):
+            parent.remove(default)
 
 
 def shown(element: Element) -> str:
@@ -84,25 +119,3 @@ def named(element: Element, parents: Mapping[Element, Element]) -> str:
 def parents_in(root: Element) -> dict[Element, Element]:
     """What each element stands in."""
     return {child: parent for parent in root.iter() for child in parent}
-
-
-def _replace_names(path: Path, root: Element, lines: Lines, defaults: dict[str, str]) -> None:
-    """In document order: a <default> may be made of those before it."""
-    for element in root.iter():
-        for attribute, text in element.items():
-            if "$" not in text:
-                continue
-            names = "|".join(map(re.escape, sorted(defaults, key=len, reverse=True)))
-            parts = re.split(rf"\$({names})", text) if names else [text]
-            new = "".join(defaults[p] if i % 2 else p for i, p in enumerate(parts))
-            if len(new) > MOST_CHARACTERS:
-                raise ValueError(
-                    f"{path}, line {lines[element]}: {attribute} of <{element.tag}> becomes "
-                    f"{len(new)} characters; $names may stand for {MOST_CHARACTERS}"
-                )
-            element.set(attribute, new)
-        if element.tag == "default":
-            defaults.setdefault(element.get("name", ""), element.get("value", ""))
-    for parent in list(root.iter()):
-        for default in parent.findall("default"):
-            parent.remove(default)

@@ -120,8 +120,8 @@ def test_what_is_no_regular_file_is_not_opened(kit) -> None:
         read_scene(kit)
 
 
-def test_included_files_are_named_from_where_they_lie(kit) -> None:
-    """Mitsuba itself would look for them where the program runs."""
+def test_included_files_may_name_what_lies_beside_them(kit) -> None:
+    """Where the scene's folder, in which Mitsuba looks, has nothing of the name."""
     inner = kit / "inner"
     inner.mkdir()
     (kit / "a.ply").rename(inner / "mesh.ply")

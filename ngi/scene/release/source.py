@@ -108,4 +108,4 @@ def _check(source: Source) -> None:
             first = source.lines[seen[name]]
             raise source.error(element, f"line {first} has this id already; make them two")
         seen[name] = element
-    check_files(source.document, source.lines, within=source.document.path.parent)
+    check_files(source.document, within=source.document.path.parent)
