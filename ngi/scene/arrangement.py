@@ -15,6 +15,7 @@ import numpy as np
 
 from ngi.scene.assets import to_world
 from ngi.scene.kinds import KeyFrames, Rotation, Scale, Shape, Translation, Visibility
+from ngi.scene.parameters import MESH_BEHIND
 from ngi.scene.scene_files import SceneFile
 from ngi.scene.variable import Variable
 
@@ -55,7 +56,7 @@ def arranged(
             static.append(shape)
         elif kind not in _PLACED:
             root.remove(shape)
-            shape.set("id", f"ngi_mesh_{name}")
+            shape.set("id", MESH_BEHIND.format(name))
             group = ElementTree.SubElement(root, "shape", type="shapegroup", id=f"ngi_{name}")
             group.append(shape)
             instance = _add_instance(root, str(name), of=group)

@@ -17,6 +17,9 @@ from ngi.scene.changes import Changes
 from ngi.scene.jit_variables import aligned
 from ngi.scene.scene_files import SceneFile
 
+MESH_BEHIND = "ngi_mesh_{}"
+"""The id of a mesh that moves, whose own an instance has; see `ngi.scene.arrangement`."""
+
 
 class Parameters:
     """What `mi.traverse` finds in a scene; needs its variant to be active.
@@ -85,12 +88,13 @@ class Parameters:
         an object without such a parameter, with the parameters that it has, and for one of several
         parts that have it alike, with these.
         """
-        owner = self.object(object_id)
+        owners = self._owners(object_id)
         keys = [
             key
             for key, (_, _, node, _) in self._parameters.properties.items()
-            if self.belongs_to(node, owner)
+            if any(self.belongs_to(node, owner) for owner in owners)
         ]
+        name = f"'{object_id}' ({owners[-1].class_name()})"
         for suffix in suffixes:
             matches = [key for key in keys if key.endswith("." + suffix)]
             matches = [key for key in matches if not of or self.owner(key).class_name() in of]
@@ -99,15 +103,15 @@ class Parameters:
                 alike = [key for key in matches if key.count(".") == found.count(".")]
                 if len(alike) > 1:
                     raise ValueError(
-                        f"{self._file}: '{object_id}' ({owner.class_name()}) has several "
-                        f"{suffix}: {alike}; give an id to the part that is meant, and name that"
+                        f"{self._file}: {name} has several {suffix}: {alike}; give an id to the "
+                        "part that is meant, and name that"
                     )
                 self._found.add(found)
                 return found
         varies = f" that varies, as a {' or '.join(of)} has" if of else ""
         raise ValueError(
-            f"{self._file}: '{object_id}' ({owner.class_name()}) has no parameter "
-            f"{' or '.join(suffixes)}{varies}, only {keys}; {hint}"
+            f"{self._file}: {name} has no parameter {' or '.join(suffixes)}{varies}, only {keys}; "
+            f"{hint}"
         )
 
     def object(self, object_id: str) -> mi.Object:
@@ -120,6 +124,11 @@ class Parameters:
             )
         return self._objects[object_id]
 
+    def _owners(self, object_id: str) -> list[mi.Object]:
+        """What has the parameters of an id: the object, and the mesh that it is the instance of."""
+        mesh = self._objects.get(MESH_BEHIND.format(object_id))
+        return [self.object(object_id), *([] if mesh is None else [mesh])]
+
     def belongs_to(self, node: mi.Object | None, owner: mi.Object) -> bool:
         """Whether a node is an object or a part of it."""
         while node is not None and node != owner:
@@ -128,9 +137,9 @@ class Parameters:
 
     def is_made_of(self, object_id: str, classes: Sequence[str]) -> bool:
         """Whether an object, or a part of it, is of one of these classes of Mitsuba."""
-        owner = self.object(object_id)
-        nodes = (node for node in self._parameters.hierarchy if node.class_name() in classes)
-        return any(self.belongs_to(node, owner) for node in nodes)
+        nodes = [node for node in self._parameters.hierarchy if node.class_name() in classes]
+        owners = self._owners(object_id)
+        return any(self.belongs_to(node, owner) for node in nodes for owner in owners)
 
     def shapes_in(self, group: mi.Object) -> int:
         """How many shapes with parameters are part of an object."""

@@ -351,6 +351,32 @@ def test_a_group_of_several_shapes_does_not_move_as_one(load) -> None:
         load({"object": "balls", **MOVE}, edit=edit)
 
 
+def own_material(bsdf):
+    """The edit that gives the curtain a BSDF of its own, without an id."""
+
+    def edit(root) -> None:
+        mesh = find(root, "curtain")
+        mesh.remove(mesh.find("ref"))
+        mesh.append(ElementTree.fromstring(bsdf))
+
+    return edit
+
+
+def test_a_mesh_that_moves_has_its_other_properties_by_its_id(make_scene) -> None:
+    activate("scalar")
+    entries = [{"object": "curtain", **ALBEDO}, {"object": "curtain", **MOVE}]
+    plain = own_material(f'<bsdf type="diffuse">{WHITE.format("").replace("_", "")}</bsdf>')
+    scene = VariableScene(read_scene(make_scene("stage", entries, dimensions=6, edit=plain)))
+    scene.apply([0.25, 0.5, 0.75, 1, 0, 0])
+    (shape,) = [shape for shape in scene.shapes if shape.id() == "ngi_mesh_curtain"]
+    reflectance = mi.traverse(shape.bsdf())["reflectance.value"]
+    np.testing.assert_allclose(np.ravel(reflectance), [0.25, 0.5, 0.75], atol=1e-6)
+    coat = f"{WOOD.format('diffuse')}{WHITE.format('specular')}"
+    wooden = own_material(f'<bsdf type="plastic">{coat}</bsdf>')
+    with pytest.raises(ValueError, match=r"'curtain' \(PLYMesh\) .* name a BSDF whose reflectance"):
+        VariableScene(read_scene(make_scene("stage", entries, dimensions=6, edit=wooden)))
+
+
 def test_two_cameras_may_be_led_together(load) -> None:
     scene = load({"object": ["camera", "other"], **LOOK}, edit=second_camera)
     scene.apply(np.ones(6))
