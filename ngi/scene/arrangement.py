@@ -75,13 +75,15 @@ def _hand_over_place(
 ) -> None:
     """Makes a shape's to_world the instance's, so that this has its origin.
 
-    Of one that mirrors only the origin: Mitsuba turns a mirrored mesh inside out, but no mirrored
-    instance of it. What Mitsuba does not read is for `load` to tell.
+    Of one that scales or mirrors only the origin: an instance would scale the radii of curves too,
+    keeps the smooth normals that Mitsuba makes up before a mesh is stretched, and does not turn a
+    mirrored mesh inside out. What Mitsuba does not read is for `load` to tell.
     """
     transforms, matrix = shape.findall("transform"), np.eye(4)
     with suppress(RuntimeError):
         matrix = to_world(document, shape)
-    if np.linalg.det(matrix[:3, :3]) < 0:
+    linear = matrix[:3, :3]
+    if np.linalg.det(linear) < 0 or not np.allclose(linear.T @ linear, np.eye(3), atol=1e-5):
         (own,) = transforms
         handed = ElementTree.Element("transform", dict(own.attrib))
         for transform, sign in ((own, -1), (handed, 1)):

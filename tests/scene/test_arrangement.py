@@ -11,10 +11,10 @@ from ngi.scene import read_scene
 from ngi.scene.arrangement import arranged
 from ngi.scene.kinds import KeyFrames, Material, Shape, Translation, Visibility
 from ngi.scene.loading import load
-from ngi.scene.scene_files import SceneFile
+from ngi.scene.scene_files import SceneFile, read_scene_file
 from ngi.scene.variable_scene import VariableScene
 from tests.render.box import BOX
-from tests.scene.stage import moved
+from tests.scene.stage import moved, set_value
 
 XML = """<scene version="3.0.0">
 <emitter type="area" id="light"/>
@@ -120,9 +120,21 @@ def test_a_moved_mesh_turns_about_its_authored_origin(tmp_path) -> None:
     assert not scene.scene.ray_intersect(mi.Ray3f([5.95, 5, 0.95], [0, -1, 0])).is_valid()
 
 
-def test_a_mirrored_mesh_that_moves_shows_the_same_side(make_scene) -> None:
-    """As it does at rest, where Mitsuba turns it inside out."""
+@pytest.mark.parametrize(
+    ("file", "factors", "origin"),
+    [
+        ("curtain_0.ply", {"x": -1.0}, [-0.1, 1, -0.5]),  # Mitsuba turns it inside out
+        ("sheet_1.ply", {"z": 0.2}, [0.1, 1, -0.1]),  # Mitsuba makes up its smooth normals
+    ],
+)
+def test_a_mesh_that_moves_is_the_authored_one(make_scene, file, factors, origin) -> None:
+    """As it is at rest, where its to_world is that of its vertices."""
     activate("scalar")
+
+    def edit(root) -> None:
+        set_value(root, "curtain", "filename", file)
+        moved("curtain", ("scale", factors))(root)
+
     entry = {
         "object": "curtain",
         "property": "rotation",
@@ -130,9 +142,7 @@ def test_a_mirrored_mesh_that_moves_shows_the_same_side(make_scene) -> None:
         "minimum": 0,
         "maximum": 90,
     }
-    description = read_scene(
-        make_scene("stage", [entry], dimensions=1, edit=moved("curtain", ("scale", {"x": -1.0})))
-    )
+    description = read_scene(make_scene("stage", [entry], dimensions=1, edit=edit))
     plain, arranged_one = load(description.document), VariableScene(description)
     arranged_one.apply([0.0])
     for x in (-0.6, -0.2, 0.1, 0.4):
@@ -143,7 +153,23 @@ def test_a_mirrored_mesh_that_moves_shows_the_same_side(make_scene) -> None:
         np.testing.assert_allclose(moving.n, at_rest.n, atol=1e-5)
         np.testing.assert_allclose(moving.sh_frame.n, at_rest.sh_frame.n, atol=1e-5)
     placement = arranged_one._parameters.placement("curtain")
-    np.testing.assert_allclose(placement.origin, [-0.1, 1, -0.5], atol=1e-6)
+    np.testing.assert_allclose(placement.origin, origin, atol=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["linearcurve", "bsplinecurve"])
+def test_a_curve_that_moves_is_as_thick_as_authored(tmp_path, kind) -> None:
+    """Its radii are no part of its to_world."""
+    activate("scalar")
+    (tmp_path / "curve.txt").write_text("".join(f"{i} 0 0 0.1\n" for i in range(4)))
+    (tmp_path / "scene.xml").write_text(
+        f"""<scene version="3.0.0"><shape type="{kind}" id="hair">
+        <string name="filename" value="curve.txt"/><transform name="to_world"><scale value="0.1"/>
+        <translate x="2"/></transform></shape></scene>"""
+    )
+    document = read_scene_file(tmp_path / "scene.xml")
+    for scene in (load(document), load(arranged(document, [move("hair")]))):
+        hits = [scene.ray_intersect(mi.Ray3f([2.15, y, 5], [0, 0, -1])) for y in (0.09, 0.11)]
+        assert [hit.is_valid() for hit in hits] == [True, False]
 
 
 @pytest.mark.parametrize(
