@@ -31,7 +31,8 @@ def has_surface(shape: mi.Shape) -> bool:
     return not shape.class_name().startswith(("Instance", "ShapeGroup"))
 
 
-def _infinite(owner: mi.Object) -> bool:
+def is_infinite(owner: mi.Object) -> bool:
+    """Whether it is an emitter that is infinitely far away."""
     return isinstance(owner, mi.Emitter) and mi.has_flag(owner.flags(), mi.EmitterFlags.Infinite)
 
 
@@ -67,7 +68,7 @@ class SceneParameters(Parameters):
                 f"{self._file}: '{object_id}' is a {owner.class_name()}; name one of {list(only)}"
             )
         body = self._body(object_id, owner)
-        if finite and _infinite(owner):
+        if finite and is_infinite(owner):
             raise ValueError(
                 f"{self._file}: '{object_id}' is infinitely far away, as every "
                 f"{owner.class_name()}; vary its rotation or, of a sun, its direction"

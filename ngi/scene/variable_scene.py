@@ -13,6 +13,7 @@ from ngi.scene.arrangement import arranged, moving
 from ngi.scene.description import SceneDescription
 from ngi.scene.kinds import Material
 from ngi.scene.loading import load
+from ngi.scene.reach import Reach
 from ngi.scene.scene_parameters import SceneParameters, has_surface
 from ngi.scene.variable import DiscreteVariable, Variable, Write
 
@@ -37,6 +38,8 @@ class VariableScene:
             document=document,
             size=float(np.linalg.norm(np.subtract(*description.bounds))),
         )
+        self._reach = Reach(self.scene, description.bounds)
+        self._reach.extend()
         self.shapes: list[mi.Shape] = self._parameters.objects(mi.Shape)
         self._writes = [self._bind(variable) for variable in description.variables]
         self._parameters.forget_the_rest()
@@ -178,4 +181,7 @@ class VariableScene:
                 changed = True
                 self.changes += not self._of_cameras[i]
         if changed:
+            built = self.rebuilds
             self._parameters.update()
+            if built is None or built != self.rebuilds:
+                self._reach.extend()
