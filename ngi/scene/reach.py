@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ngi.machine.backend import mi
 from ngi.scene.scene_parameters import is_infinite
@@ -21,16 +22,19 @@ class Reach:
         low, high = (np.ravel(corner) for corner in (scene.bbox().min, scene.bbox().max))
         within = np.linalg.norm(np.subtract(*bounds)) <= np.linalg.norm(high - low)
         self._emitters = [e for e in scene.emitters() if not within and is_infinite(e)]
-        self._low, self._high = np.minimum(low, bounds[0]), np.maximum(high, bounds[1])
+        if self._emitters:  # loaded once: scenes that are loaded again and again leak memory
+            self._box = _box(np.minimum(low, bounds[0]), np.maximum(high, bounds[1]))
 
     def extend(self) -> None:
         """Makes these rays as long as they have to be, after loading and whenever Mitsuba has
         built the scene anew, which takes it back.
         """
-        if not self._emitters:
-            return
-        middle, half = (self._low + self._high) / 2, (self._high - self._low) / 2
-        place = mi.ScalarTransform4f().translate(middle.tolist()).scale(half.tolist())
-        box = mi.load_dict({"type": "scene", "box": {"type": "cube", "to_world": place}})
         for emitter in self._emitters:
-            emitter.set_scene(box)
+            emitter.set_scene(self._box)
+
+
+def _box(low: NDArray[np.float64], high: NDArray[np.float64]) -> mi.Scene:
+    """A scene with these corners [3]."""
+    place = mi.ScalarTransform4f().translate(((low + high) / 2).tolist())
+    place = place.scale(((high - low) / 2).tolist())
+    return mi.load_dict({"type": "scene", "box": {"type": "cube", "to_world": place}})
