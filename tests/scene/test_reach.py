@@ -6,8 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 
 from ngi.machine.backend import activate, llvm_problem, mi
+from ngi.render.exr import write_exr
 from ngi.scene import read_scene
 from ngi.scene.variable_scene import VariableScene
 
@@ -46,7 +48,7 @@ def test_what_moves_far_away_casts_a_shadow(tmp_path: Path, backend, kind, emitt
     if backend == "llvm" and (problem := llvm_problem()) is not None:
         pytest.skip(problem)
     activate(backend)
-    mi.Bitmap(np.ones((4, 8, 3), np.float32)).write(str(tmp_path / "sky.exr"))
+    write_exr(tmp_path / "sky.exr", torch.ones(4, 8, 3))
     (tmp_path / "scene.xml").write_text(SCENE.format(emitter, kind))
     (tmp_path / "scene.yaml").write_text(YAML)
     scene = VariableScene(read_scene(tmp_path))
