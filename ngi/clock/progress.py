@@ -51,10 +51,10 @@ class Progress:
         counters, budget = self._counters(), self._budget
         left = math.inf if budget.steps is None else float(budget.steps - counters.iteration)
         if budget.seconds is not None:
-            seconds = self._clock.seconds
+            spent, seconds = self._clock.run_seconds, self._clock.seconds
             fresh = sum(seconds[phase] for phase in OF_A_NEW_BATCH)
             of_a_batch = fresh / max(1, counters.generated_batches)
-            remaining = budget.seconds - self._clock.run_seconds - new_batches * of_a_batch
-            of_a_step = (self._clock.run_seconds - fresh) / counters.iteration
+            remaining = budget.seconds - spent - new_batches * of_a_batch
+            of_a_step = (spent - fresh) / counters.iteration
             left = min(left, remaining / of_a_step if of_a_step > 0 else math.inf)
         return max(0.0, left)

@@ -3,8 +3,9 @@
 import numpy as np
 import pandas as pd
 import pytest
+import torch
 
-from ngi.reuse import FixedProbability
+from ngi.reuse import Epochs, FixedProbability
 from tests.docs.pages import ROOT
 from tests.docs.tables import over_scenes, rows_of, tenths
 from tests.docs.test_figures import geometric_mean, said
@@ -77,21 +78,20 @@ def times_trained_on(stored_alone: float, *, steps: int = 2000, batch: int = 8) 
     policy = FixedProbability.by_samples(
         bootstrap_batches=4, times_at_32=12.5, samples_per_pixel=32, stored_alone=stored_alone
     )
-    generator, times, waiting = np.random.default_rng(0), np.zeros(0), np.zeros(0, int)
+    generator, waiting = torch.Generator().manual_seed(0), torch.zeros(0, dtype=torch.int64)
+    times = torch.zeros(0)
     for step in range(steps):
         generated = len(times) // batch
         probability = policy.probability(
             policy.init(), generated_batches=generated, store_size=len(times), store_capacity=10**6
         )
         reused = policy.reuses(probability, draw=0, batches=step, generated_batches=generated)
-        if reused or (step >= (1 - stored_alone) * steps and stored_alone > 0):
-            while len(waiting) < batch:
-                waiting = np.concatenate([waiting, generator.permutation(len(times))])
-            drawn, waiting = waiting[:batch], waiting[batch:]
+        if reused or step >= (1 - stored_alone) * steps:
+            drawn, waiting = Epochs().draw(times, waiting, batch, generator)
             times[drawn] += 1
         else:
-            times = np.concatenate([times, np.ones(batch)])
-    return times
+            times = torch.cat([times, torch.ones(batch)])
+    return times.numpy()
 
 
 def test_how_often_patches_were_trained_on_is_counted() -> None:

@@ -20,6 +20,7 @@ from ngi.train import train
 from tests.learn.command_line import SIZE
 from tests.learn.comparison import assert_same
 from tests.learn.composition import run_config
+from tests.learn.noted_rates import noted_rates
 
 pytestmark = [  # as ngi.learn.lightning_api has them, which pytest resets
     pytest.mark.filterwarnings(f"ignore:.*{words}")
@@ -229,14 +230,7 @@ def test_the_last_steps_are_on_stored_patches_and_the_rate_falls_during_these_al
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """These are a quarter of the steps, and far less of the seconds."""
-    rates = []
-    step = torch.optim.Adam.step
-
-    def noted(self: torch.optim.Adam, *arguments: Any, **options: Any) -> Any:
-        rates.append(self.param_groups[0]["lr"])
-        return step(self, *arguments, **options)
-
-    monkeypatch.setattr(torch.optim.Adam, "step", noted)
+    rates = noted_rates(torch.optim.Adam, monkeypatch)
     config = with_costs(
         model_clock(
             tmp_path,

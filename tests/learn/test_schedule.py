@@ -12,6 +12,7 @@ from ngi.models.batched_muon import BatchedMuon
 from ngi.train import train
 from tests.learn.forked import configuration
 from tests.learn.lightning_warnings import IGNORED
+from tests.learn.noted_rates import noted_rates
 
 pytestmark = IGNORED
 
@@ -103,20 +104,9 @@ def test_every_step_is_taken_at_its_rate_and_the_clocks_share_decides(
     optimizer: tuple[str, ...],
     base: dict[str, float],
 ) -> None:
-    rates: dict[str, list[float]] = {}
-
-    def note(rule: type[torch.optim.Optimizer]) -> None:
-        step = rule.step
-
-        def noted(self: torch.optim.Optimizer, *arguments: Any, **options: Any) -> Any:
-            (group,) = self.param_groups
-            rates.setdefault(rule.__name__, []).append(group["lr"])
-            return step(self, *arguments, **options)
-
-        monkeypatch.setattr(rule, "step", noted)
-
-    note(torch.optim.Adam)
-    note(BatchedMuon)
+    noted = {
+        rule.__name__: noted_rates(rule, monkeypatch) for rule in (torch.optim.Adam, BatchedMuon)
+    }
     config = configuration(
         tmp_path,
         *optimizer,
@@ -127,6 +117,7 @@ def test_every_step_is_taken_at_its_rate_and_the_clocks_share_decides(
     )
     train(config)
     of_schedule = factors(schedule(), 40)
+    rates = {rule: of_steps for rule, of_steps in noted.items() if of_steps}
     assert rates.keys() == base.keys()
     for rule, rate in base.items():
         assert rates[rule] == pytest.approx([rate * factor for factor in of_schedule])

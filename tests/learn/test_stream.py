@@ -220,16 +220,20 @@ def test_an_unknown_word_for_late_patches_is_refused(tmp_path: Path) -> None:
         make(tmp_path, when_late="skip")
 
 
+def progress(stream: TrainingStream, *, steps: int, stored_alone: float) -> Progress:
+    return Progress(
+        budget=Budget(steps=steps),
+        clock=stream.clock,
+        counters=lambda: stream.counters,
+        stored_alone=stored_alone,
+    )
+
+
 @pytest.mark.parametrize("late", ["wait", "reuse"])
 def test_the_last_share_of_the_steps_is_on_stored_patches(late: str, tmp_path: Path) -> None:
     policy = FixedProbability(bootstrap_batches=3, probability=0.5, stored_alone=0.2)
     stream = make(tmp_path, policy=policy, when_late=late)
-    stream.progress = Progress(
-        budget=Budget(steps=50),
-        clock=stream.clock,
-        counters=lambda: stream.counters,
-        stored_alone=policy.stored_alone,
-    )
+    stream.progress = progress(stream, steps=50, stored_alone=policy.stored_alone)
     generated = [batch.generated for batch in steps(stream, 50)]
     assert sum(generated[:40]) == pytest.approx(3 + 0.5 * 37, abs=1)
     assert generated[38:40].count(True) == 1, "new ones come to the end of the first share"
@@ -239,10 +243,5 @@ def test_the_last_share_of_the_steps_is_on_stored_patches(late: str, tmp_path: P
 
 def test_a_batch_that_has_to_be_new_is_never_too_late(tmp_path: Path) -> None:
     stream = make(tmp_path, policy=FixedProbability(bootstrap_batches=6, probability=0.5))
-    stream.progress = Progress(
-        budget=Budget(steps=5),
-        clock=stream.clock,
-        counters=lambda: stream.counters,
-        stored_alone=0.2,
-    )
+    stream.progress = progress(stream, steps=5, stored_alone=0.2)
     assert all(batch.generated for batch in steps(stream, 5))
