@@ -10,6 +10,9 @@ from analysis.runs import DISTINCTIONS, Run
 BASELINE = "uniform"
 """The method (and sampler) that others are compared with; it comes first."""
 
+OF_SAMPLER = "sampler="
+"""What begins the override, and the part of a name, that says which sampler a method was given."""
+
 TITLES = {
     "uniform": "uniform sampling",
     "active_exploration": "Active Exploration",
@@ -22,7 +25,7 @@ TITLES = {
     "traced_specular": "traced specular bounces",
     "traced_direct": "traced direct light",
     "ours_uniform": "ours with uniform sampling",
-    "ours": "ours with a Sobol sequence",
+    "ours": "ours",
     "ours_predicted": "ours with more states of high predicted loss",
     "ours_eager": "ours after what is rare, by predicted loss",
     "ours_predicted_from_buffers": "ours with patches chosen by their buffers",
@@ -55,9 +58,10 @@ TITLES = {
 def name_methods(runs: Sequence[Run]) -> list[Run]:
     """The same runs with `method` set: what was chosen, and what else their methods differ by.
 
-    What was chosen is the option of the group `method`, or without one the sampler. 'uniform' and
-    'mcmc_loss' suffice where each was run in one way. Otherwise the fewest label fields that tell
-    its runs apart follow: 'mcmc_loss, growing'.
+    What was chosen is the option of the group `method`, or without one the sampler, and the sampler
+    that a method was given in place of its own: 'ours, sampler=uniform'. 'uniform' and 'mcmc_loss'
+    suffice where each was run in one way. Otherwise the fewest label fields that tell its runs
+    apart follow: 'mcmc_loss, growing'.
     """
     named = []
     for run in runs:
@@ -69,7 +73,11 @@ def name_methods(runs: Sequence[Run]) -> list[Run]:
 
 
 def _chosen(run: Run) -> str:
-    return run.label.get("method") or run.label["sampler"]
+    method = run.label.get("method")
+    if not method:
+        return run.label["sampler"]
+    given = [word for word in run.label["overrides"].split(",") if word.startswith(OF_SAMPLER)]
+    return ", ".join([method, *given])
 
 
 def methods_in_order(runs: Sequence[Run]) -> list[str]:
@@ -84,8 +92,11 @@ def methods_in_order(runs: Sequence[Run]) -> list[str]:
 
 
 def is_baseline(method: str, *, baseline: str = BASELINE) -> bool:
-    """baseline: a method's name, or what all names of its variants begin with"""
-    return baseline in (method, method.split(", ")[0])
+    """baseline: a method's name, what all names of its variants begin with, or a sampler that a
+    method was given in place of its own
+    """
+    base, *rest = method.split(", ")
+    return baseline in (method, base) or f"{OF_SAMPLER}{baseline}" in rest
 
 
 def baselines(budgets: Mapping[str, object], *, baseline: str = BASELINE) -> list[tuple[str, str]]:

@@ -210,8 +210,13 @@ def group(label: dict[str, Any], options: Mapping[str, Any]) -> str:
 
 
 def job_type(label: dict[str, Any]) -> str:
-    """What tells the runs of a sweep apart beside scene and seed: the method."""
-    return str(label["method"] or label["sampler"])
+    """What tells the runs of a sweep apart beside scene and seed: the method, with the sampler that
+    it was given in place of its own ('ours, sampler=uniform').
+    """
+    if not label["method"]:
+        return str(label["sampler"])
+    given = [word for word in label["overrides"].split(",") if word.startswith("sampler=")]
+    return ", ".join([label["method"], *given])
 
 
 def shown_name(label: dict[str, Any]) -> str:

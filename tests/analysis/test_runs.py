@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.methods import differing_fields, methods_in_order, name_methods, title
+from analysis.methods import baselines, differing_fields, methods_in_order, name_methods, title
 from analysis.runs import check_comparable, find_runs
 from tests.analysis.changes import set_value
 from tests.analysis.traces import CHAINS, write_trace
@@ -82,6 +82,21 @@ def test_a_method_run_in_two_ways_is_two(make_run, tmp_path) -> None:
     assert methods(tmp_path) == names
     assert title(names[0]) == "Active Exploration, never"
     assert title("mcmc_release") == "mcmc_release"
+
+
+def test_a_sampler_in_place_of_a_methods_own_is_part_of_the_name(make_run, tmp_path) -> None:
+    make_run(sampler="sobol", method="ours")
+    for name in ("mine", "uniform"):
+        make_run(sampler=name, method="ours", overrides=f"method=ours,sampler={name},seed=0")
+    names = ["ours, sampler=uniform", "ours", "ours, sampler=mine"]
+    assert methods(tmp_path) == names
+    assert [title(name) for name in names] == names
+    assert baselines(dict.fromkeys(names)) == [(name, names[0]) for name in names[1:]]
+
+
+def test_that_sampler_is_named_where_nothing_else_was_run(make_run, tmp_path) -> None:
+    make_run(sampler="mine", method="ours", overrides="sampler=mine")
+    assert methods(tmp_path) == ["ours, sampler=mine"]
 
 
 @pytest.mark.parametrize(

@@ -240,6 +240,13 @@ def test_runs_belong_together_by_sweep_experiment_or_budget() -> None:
     assert [remote.job_type({**LABEL, "method": m}) for m in ("ours", None)] == ["ours", "m"]
 
 
+def test_means_over_seeds_are_of_one_sampler() -> None:
+    """Where samplers of a method are swept over, curves grouped by job type would mix them else."""
+    label = {**LABEL, "method": "ours", "sampler": "mine", "overrides": "a=b,sampler=mine,c=d"}
+    assert remote.job_type(label) == "ours, sampler=mine"
+    assert remote.shown_name(label) == "s/ours, sampler=mine/0"
+
+
 def test_the_lowest_value_is_that_of_all_rows_and_nan_is_none(tmp_path) -> None:
     (tmp_path / "metrics.csv").write_text("step,hard_mape,hard_lpips,a\n1,0.3,,1\n2,0.5,,1\n")
     told = []
