@@ -1,10 +1,11 @@
 """Programs that Hydra configures: the words of their command lines, and what is wrong with them.
 
-Where the words name no budget, and no method but one of ours, that one (or else `method=ours`) is
+Where the words name no budget, and no method or one of ours, that one (or else `method=ours`) is
 trained at a size that suits this machine: `ngi train scene=X budget.seconds=60` gives the best
-network that it can train in that time. Where they name no method, and a budget that is not the
-paper's, it is the one of ours that had the least error there. Another method, an experiment, a
-sweep or another budget, once named, is taken at its word.
+network that it can train in that time. Methods that are compared with ours have the same size.
+Where they name no method, and a budget that is not the paper's, it is the one of ours that had the
+least error there. Other methods alone, an experiment, a sweep or another budget, once named, are
+taken at their word.
 
 What is wrong is said once, with the nearest of what there is.
 """
@@ -15,6 +16,7 @@ import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from difflib import get_close_matches
+from traceback import format_exception
 from typing import Any, NoReturn
 
 from hydra._internal.utils import get_args_parser
@@ -31,6 +33,7 @@ from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from ngi.config.unread_output import readers_may_leave
+from ngi.files.extras import install_command
 from ngi.files.resources import config_groups, scene_places
 
 MULTIRUN = ("-m", "--multirun")
@@ -41,6 +44,9 @@ BEST_METHOD = {"machine": "ours", "hour": "ours_small_patches", "scarce": "ours_
 """Of each budget for ours: what had the least error there, scene by scene, of what was tried
 (docs/guide/sampler.md).
 """
+
+LAUNCHERS = {"joblib": "joblib", "submitit_local": "slurm", "submitit_slurm": "slurm"}
+"""Options of hydra/launcher that are packages of their own: the extra that each is in."""
 
 CHOOSING = ("experiment", "sweeps", "path_tracing")
 """Groups whose choice says what is trained, and for how long."""
@@ -56,8 +62,8 @@ def completed(words: Sequence[str]) -> list[str]:
     budget = named.get("budget", "machine")
     swept = re.sub(r"^choice\((.*)\)$", r"\1", named.get("method", "ours").strip())
     methods = re.split(r"[\s,]+", swept.strip())
-    of_others = not all(re.fullmatch(r"ours(_\w+)?(/\w+)?", method) for method in methods)
-    if budget not in BEST_METHOD or of_others or any(group in named for group in CHOOSING):
+    with_ours = any(re.fullmatch(r"ours(_\w+)?(/\w+)?", method) for method in methods)
+    if budget not in BEST_METHOD or not with_ours or any(group in named for group in CHOOSING):
         return list(words)
     ours = {"budget": budget, "method": BEST_METHOD[budget]}
     added = (f"{group}={choice}" for group, choice in ours.items() if group not in named)
@@ -119,8 +125,8 @@ def run_program(program: Callable[[], None], *, folder_option: str = "run.folder
     """Calls a function that `hydra.main` has made.
 
     Where its configuration cannot be composed or a job of a sweep has failed, the process ends with
-    status 1 and one message, after Ctrl-C with status 130. Who sets HYDRA_FULL_ERROR=1 gets the
-    exception with its traceback.
+    status 1 and one message, after Ctrl-C with status 130. Who sets HYDRA_FULL_ERROR=1 gets Hydra's
+    own exceptions with their tracebacks; that of a job's error is in its log file (`fail`).
 
     folder_option: what chooses the folder that Hydra writes to
     """
@@ -150,15 +156,25 @@ def fail(error: Exception, *, job: str) -> NoReturn:
     """Ends a job whose error says to users what is wrong. job: its folder or name
 
     A single one ends the process. Jobs of a sweep leave that to Hydra, which lets the others run
-    and reports only the first that has failed: each says for itself what was wrong.
+    and reports only the first that has failed: each says for itself what was wrong. The traceback
+    is kept in the job's log file.
     """
     message = in_plain_words(error)
     log.error("%s", message)
-    log.debug("traceback", exc_info=True)
+    _keep_traceback(error)
     if HydraConfig.get().mode is RunMode.RUN:
         raise SystemExit(1) from error
     what = "see above" if _shares_the_terminal() else message
     raise CompactHydraException(f"{job} failed: {what}") from error
+
+
+def _keep_traceback(error: Exception) -> None:
+    """In the log file, not on the terminal: where an error is in a class of the user's own."""
+    traceback = "".join(format_exception(error)).rstrip()
+    record = log.makeRecord(log.name, logging.ERROR, __file__, 0, traceback, (), None)
+    for handler in logging.getLogger().handlers:
+        if isinstance(handler, logging.FileHandler):
+            handler.handle(record)
 
 
 def in_plain_words(error: Exception) -> str:
@@ -183,6 +199,8 @@ def explained(error: Exception) -> str:
         near = get_close_matches(option, error.options, n=1)
         group = "scene" if group.startswith("scene/") else group  # a path, not a name
         where = _about_scenes(option) if group == "scene" else ""
+        if option in LAUNCHERS:
+            where = f"; {install_command(LAUNCHERS[option])} brings it"
         return (
             f"{error.missing_cfg_file}: there is no such option; "
             f"{group} can be {', '.join(error.options)}{where}{_question(near)}"

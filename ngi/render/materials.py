@@ -87,8 +87,8 @@ def _inside(inner: mi.BSDF, bsdf: mi.BSDF) -> Material:
         return _inside(children["nested_bsdf"], bsdf)
     if kind not in _KINDS:
         raise ValueError(
-            f"BSDF '{bsdf.id()}' is of kind {kind}, whose albedo and roughness are not known; "
-            f"use one of {sorted(_KINDS)}, or add it to {__name__}"
+            f"BSDF '{bsdf.id()}' is a {kind}, whose albedo and roughness are not known; use one of "
+            f"{', '.join(_plugins())}, or add it to {__name__}"
         )
     albedo_name, roughness_of = _KINDS[kind]
     roughness, constant = roughness_of(inner, children)
@@ -219,3 +219,8 @@ _KINDS: dict[str, tuple[str, Callable[..., tuple[Lookup, float | None]]]] = {
     "Principled": ("base_color", _principled),
 }
 """Class of the BSDF -> its texture that is the albedo (1 where it has none), and its roughness."""
+
+
+def _plugins() -> list[str]:
+    """The same, as scene files name them."""
+    return [kind.removeprefix("Smooth").lower() for kind in _KINDS]

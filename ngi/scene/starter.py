@@ -71,7 +71,8 @@ def starter_yaml(document: SceneFile, scene: mi.Scene, found: list[Candidate]) -
         f"# Check it: ngi describe {shlex.quote(str(document.path.parent))}",
         f"name: {_word(folder_name)}",
         f"scene: {_word(document.path.name)}",
-        f"samples_per_pixel: {count if count > 1 else 64}  # of training patches",
+        f"samples_per_pixel: {count if count > 1 else 64}  # of training patches "
+        "with budget=scarce or paper; other budgets have their own",
         f"max_depth: {integrator_max_depth(document)}",
         "# Everything that the camera can see, over the whole range of the variables.",
         f"bounds: {{minimum: {_list(low)}, maximum: {_list(high)}}}",

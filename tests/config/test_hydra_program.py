@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 import torch
-from hydra.errors import HydraException
+from hydra.errors import HydraException, MissingConfigException
 from omegaconf.errors import OmegaConfBaseException
 
 from ngi.config.configuration import composed
@@ -137,7 +137,9 @@ def test_an_error_of_a_run_is_said_once_and_kept_where_the_run_is(
     assert "Error executing" not in output
     assert "Traceback" not in output
     assert "full_key" not in output
-    assert line in (tmp_path / "here" / "run" / "train.log").read_text()
+    kept = (tmp_path / "here" / "run" / "train.log").read_text()
+    assert line in kept
+    assert "Traceback (most recent call last):" in kept  # the only way to a line of one's own class
     assert [path.name for path in tmp_path.rglob("train.log")] == ["train.log"]
     assert not (tmp_path / "outputs").exists()
 
@@ -153,6 +155,12 @@ def test_costs_name_what_chooses_the_folder_they_write_to(tmp_path: Path) -> Non
     status, output = run_module("ngi.studies.costs", *SMALL, folder=tmp_path)
     assert status == 1
     assert f"'{tmp_path / 'cache' / 'costs'}'; choose another folder with NGI_CACHE=…" in output
+
+
+def test_a_launcher_that_is_not_installed_is_told_how_to_get() -> None:
+    missing = MissingConfigException("", "hydra/launcher/submitit_slurm", ["basic"])
+    assert "launcher can be basic; pip install " in explained(missing)
+    assert "[slurm]" in explained(missing)
 
 
 def test_ctrl_c_ends_a_program_without_a_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
