@@ -10,6 +10,7 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
 
 from ngi.machine.energy import EnergyMeter, energy_counters
+from ngi.machine.precision import trains_on_gpu
 
 if TYPE_CHECKING:  # PyTorch and Lightning take seconds that --help need not wait for
     from torch import nn
@@ -206,10 +207,7 @@ def run_costs(
 
 def training_device(config: DictConfig) -> str:
     """Where Lightning's trainer trains."""
-    import torch
-
-    on_gpu = config.trainer.accelerator != "cpu" and torch.cuda.is_available()
-    return "cuda" if on_gpu else "cpu"
+    return "cuda" if trains_on_gpu(config.trainer.accelerator) else "cpu"
 
 
 def without_seed(config: DictConfig) -> dict[str, Any]:

@@ -1,5 +1,6 @@
 """Production denoisers of path-traced images, and training patches whose noise they take off."""
 
+import os
 from dataclasses import replace
 from typing import Protocol
 
@@ -46,6 +47,11 @@ class OpenImageDenoise:
                 f"Open Image Denoise is asked for, and needs {error.name}: "
                 f"{install_command('denoise')}"
             ) from error
+        # Where several runs share a machine, OMP_NUM_THREADS says which part of it each may take.
+        # This library does not read that, and pins threads, those of every run to the same cores.
+        if threads := os.environ.get("OMP_NUM_THREADS"):
+            os.environ.setdefault("OIDN_NUM_THREADS", threads)
+            os.environ.setdefault("OIDN_SET_AFFINITY", "0")
         self._denoise = pyoidn.denoise
 
     def __call__(self, radiance: Tensor, albedo: Tensor, normal: Tensor) -> Tensor:

@@ -25,12 +25,20 @@ def multiplies_bfloat16(device: str) -> bool:
     return not on_x86 or bool(units.get("avx512_bf16") or units.get("amx_bf16"))
 
 
-def fast_precision() -> str:
-    """Lightning's 'bf16-mixed' where the processor or GPU computes in bfloat16, else '32-true'."""
+def fast_precision(accelerator: str = "auto") -> str:
+    """Lightning's 'bf16-mixed' where the processor or GPU computes in bfloat16, else '32-true'.
+
+    accelerator: the trainer's; 'cpu' leaves a GPU out
+    """
+    device = "cuda" if trains_on_gpu(accelerator) else "cpu"
+    return "bf16-mixed" if multiplies_bfloat16(device) else "32-true"
+
+
+def trains_on_gpu(accelerator: str) -> bool:
+    """Whether Lightning's trainer of this accelerator does, on this machine."""
     import torch
 
-    device = "cuda" if torch.cuda.is_available() else "cpu"
-    return "bf16-mixed" if multiplies_bfloat16(device) else "32-true"
+    return accelerator != "cpu" and torch.cuda.is_available()
 
 
 def dtype_of(precision: str) -> torch.dtype:

@@ -4,6 +4,8 @@ import math
 import os
 from typing import Any
 
+from ngi.machine.precision import trains_on_gpu
+
 SECONDS_PER_BATCH = 15.0
 """Of the budget, for each batch that is rendered before the first is reused."""
 
@@ -14,14 +16,17 @@ WARMUP_STEPS = 30
 """Of the learning rate, where the budget has room for them."""
 
 
-def network_width() -> int:
-    """Features of a hidden layer: 512 on a GPU (paper, Sec. 4.2), 128 on a processor."""
-    return 512 if _has_gpu() else 128
+def network_width(accelerator: str = "auto") -> int:
+    """Features of a hidden layer: 512 on a GPU (paper, Sec. 4.2), 128 on a processor.
+
+    accelerator: the trainer's; 'cpu' leaves a GPU out
+    """
+    return 512 if trains_on_gpu(accelerator) else 128
 
 
-def network_depth() -> int:
+def network_depth(accelerator: str = "auto") -> int:
     """Number of hidden layers: 8 on a GPU (paper, Sec. 4.2), 6 on a processor."""
-    return 8 if _has_gpu() else 6
+    return 8 if trains_on_gpu(accelerator) else 6
 
 
 def usable_cores() -> int:
@@ -45,9 +50,3 @@ def warmup_steps(steps: Any) -> int:
     steps: of the budget; None for a budget in seconds, and anything else is what is refused later
     """
     return min(WARMUP_STEPS, steps // 4) if isinstance(steps, int) else WARMUP_STEPS
-
-
-def _has_gpu() -> bool:
-    import torch  # resolved from the configuration, which --help shows without PyTorch
-
-    return torch.cuda.is_available()

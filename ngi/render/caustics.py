@@ -17,7 +17,7 @@ from torch.quasirandom import SobolEngine
 
 from ngi.machine.backend import dr, mi
 from ngi.render.irradiance_pictures import IrradiancePictures
-from ngi.render.materials import children_of, has_bsdf
+from ngi.render.materials import Material, children_of, collect_materials, has_bsdf
 from ngi.render.specular import SpecularChain
 from ngi.scene.variable_scene import VariableScene
 
@@ -55,13 +55,13 @@ class Mirror:
 class Caustics:
     """Traces the photons of a scene.
 
-    chain: what they follow. mirrors: where they start, at least one. principled: BSDFs of that
-        kind, or with such a side, whose base colour counts as that of a diffuse one.
+    chain: what they follow. mirrors: where they start, at least one. principled: materials of that
+        kind, or with such a side, whose albedo counts as that of a diffuse one.
     """
 
     chain: SpecularChain
     mirrors: list[Mirror]
-    principled: list[mi.BSDF]
+    principled: list[Material]
     pictures: IrradiancePictures
 
     def trace(self, scene: mi.Scene, photons: Sequence[mi.Float]) -> mi.Float:
@@ -95,10 +95,9 @@ class Caustics:
         # Where photons came from is not kept: as if from along the normal.
         along = mi.Vector3f(0, 0, dr.mulsign(mi.Float(1), mi.Frame3f.cos_theta(hit.wi)))
         scattered = hit.bsdf().eval(_diffuse_part(), hit, along, active)
-        for bsdf in self.principled:  # which have no part of their own
-            here = has_bsdf(hit, bsdf, active)
-            base = bsdf.eval_diffuse_reflectance(hit, here) / dr.pi
-            scattered = dr.select(here, base, scattered)
+        for material in self.principled:  # which have no part of their own
+            here = has_bsdf(hit, material.bsdf, active)
+            scattered = dr.select(here, material.albedo(hit, here) / dr.pi, scattered)
         irradiance = self.pictures.irradiance(traced, hit)
         return dr.select(active, irradiance * scattered, 0)
 
@@ -124,7 +123,7 @@ def caustics_of(scene: VariableScene, chain: SpecularChain) -> Caustics | None:
     return Caustics(
         replace(chain, maximum_bounces=bounces, direct=False, photons=True),
         mirrors,
-        [bsdf for bsdf in scene.bsdfs() if _is_of_kind(bsdf, "Principled")],
+        collect_materials([each for each in scene.bsdfs() if _is_of_kind(each, "Principled")]),
         IrradiancePictures(scene.description.bounds),
     )
 

@@ -1,5 +1,6 @@
 """Open Image Denoise on closed formulas; OptiX where there is a GPU."""
 
+import os
 import sys
 
 import pytest
@@ -82,6 +83,18 @@ def test_small_patches_lose_little_for_being_small(oidn: OpenImageDenoise) -> No
     error = (together.log_radiance - clean.log_radiance).abs().mean()
     error_alone = (alone - clean.log_radiance).abs().mean()
     assert error < 0.9 * error_alone
+
+
+@pytest.mark.parametrize(("given", "threads"), [({}, "3"), ({"OIDN_NUM_THREADS": "5"}, "5")])
+def test_a_run_that_shares_a_machine_denoises_on_its_part_of_it(
+    given: dict[str, str], threads: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On no cores in particular: all runs would be pinned to the same ones."""
+    pytest.importorskip("pyoidn", reason="the extra 'denoise' is missing")
+    monkeypatch.setattr(os, "environ", {"OMP_NUM_THREADS": "3", **given})
+    OpenImageDenoise()
+    assert os.environ["OIDN_NUM_THREADS"] == threads
+    assert os.environ["OIDN_SET_AFFINITY"] == "0"
 
 
 def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

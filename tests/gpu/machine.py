@@ -152,7 +152,7 @@ def _patch_renderers(monkeypatch: pytest.MonkeyPatch) -> None:
         return lambda *what, **how: render(*what, **how).to(DEVICE)
 
     monkeypatch.setattr(ClosedFormRenderer, "render_patches", patches_on_gpu)
-    for name in ("render_image", "image_buffers"):
+    for name in ("render_image", "image_buffers", "pixel_buffers"):
         monkeypatch.setattr(ClosedFormRenderer, name, on_gpu(getattr(ClosedFormRenderer, name)))
 
 

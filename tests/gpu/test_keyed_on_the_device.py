@@ -9,6 +9,7 @@ from hydra.utils import instantiate
 from ngi.clock.costs import components
 from ngi.config.build import plain
 from ngi.evaluate.references import ReferenceCache, _content_key
+from ngi.machine.precision import multiplies_bfloat16
 from ngi.machine.provenance import provenance
 from ngi.machine.size import network_depth, network_width
 from ngi.render import AnalyticRenderer
@@ -54,3 +55,19 @@ def test_references_are_shared_by_all_devices(tmp_path: Path) -> None:
 def test_a_result_names_the_card_and_sizes_are_the_papers() -> None:
     assert provenance(backend="none")["machine"]["gpu"] == NAME
     assert (network_width(), network_depth()) == (512, 8)
+
+
+@pytest.mark.usefixtures("gpu")
+def test_who_trains_on_the_processor_gets_its_size_and_precision() -> None:
+    ours = ("method=ours", "budget=machine", "~renderer.direct", "~renderer.specular")
+    by_accelerator = {name: run_config(*ours, f"trainer.accelerator={name}") for name in SIZES}
+    assert {
+        name: (config.model.hidden_features, config.model.hidden_layers)
+        for name, config in by_accelerator.items()
+    } == SIZES
+    assert by_accelerator["auto"].trainer.precision == "bf16-mixed"
+    expected = "bf16-mixed" if multiplies_bfloat16("cpu") else "32-true"
+    assert by_accelerator["cpu"].trainer.precision == expected
+
+
+SIZES = {"auto": (512, 8), "cpu": (128, 6)}

@@ -44,6 +44,11 @@ RUNS = {
     # With seed 0 a number of Muon's is rounded one way or the other to bfloat16: a loss larger by a
     # millionth does on the CPU alone what another order of sums does, 1.1 times what is allowed.
     "ours, exploring": (*OURS, "sampler=mcmc_loss_step", "sampler.chains=4", "seed=1"),
+    "ours, looking": (
+        *(*OURS, "sampler=predicted_from_buffers", "sampler.chains=4", "sampler.candidates=16"),
+        *("sampler.uniform_first=8", "averaging=exponential"),
+    ),
+    "ours, eager": (*OURS, "method=ours_eager", "sampler.chains=4", "seed=1"),
     "cnsr": ("renderer=analytic", "method=cnsr", *SETS),
     "anf": ("renderer=analytic", "method=anf", *SEQUENCES),
 }

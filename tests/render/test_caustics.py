@@ -266,6 +266,17 @@ def test_a_coat_takes_its_share_of_the_light_that_falls_through_it(load, nonline
     assert_close(added, REFLECTANCE * of_a_lamp(LAMP_BEHIND) * share, mean=0.02, rms=0.1)
 
 
+def test_a_principled_floor_shows_them_by_its_base_colour(load, monkeypatch) -> None:
+    """Looked up as its albedo is: on CUDA a method of a BSDF called by itself, with a mask, reads a
+    texture for some threads only, which ends the process (docs/upstream.md).
+    """
+    monkeypatch.delattr(mi.BSDF, "eval_diffuse_reflectance")
+    floor = DIFFUSE.replace('"diffuse"', '"principled"').replace("reflectance", "base_color")
+    shapes = FLOOR.replace(DIFFUSE, floor) + LAMP + rectangle("wall", WALL, MIRROR)
+    added = direct(load(shapes)) - direct(load(shapes, direct="traced"))
+    assert_close(added, REFLECTANCE * of_a_lamp(LAMP_BEHIND), mean=0.02, rms=0.1)
+
+
 def test_few_photons_blur_but_lose_no_light(load, monkeypatch) -> None:
     monkeypatch.setattr("ngi.render.caustics.PHOTONS", 2**8)
     shapes = FLOOR + LAMP + rectangle("wall", WALL, MIRROR)

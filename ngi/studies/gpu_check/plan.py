@@ -44,7 +44,9 @@ class Sizes:
     repeats: int = 20
     patches: int = 10_000
     training: tuple[str, ...] = ("living-room", "sphere-caustic")
-    training_methods: tuple[str, ...] = ("active_exploration", "uniform")
+    training_methods: tuple[str, ...] = (
+        *("active_exploration", "uniform", "ours", "ours_small_patches"),
+    )
     training_overrides: tuple[str, ...] = (
         *("budget=paper", "trainer=fast", "budget.seconds={seconds}"),
     )

@@ -11,18 +11,19 @@ import pytest
 import torch
 
 from ngi.machine.provenance import provenance
+from ngi.render import AnalyticRenderer
 from ngi.studies.benchmark.figures import Figure, figure
-from ngi.studies.benchmark.scenes import one_per_folder
+from ngi.studies.benchmark.scenes import one_per_folder, shipped
 from ngi.studies.gpu_check import runs
 from ngi.studies.gpu_check.__main__ import check, work
 from ngi.studies.gpu_check.item import CutOffError, Item, Outcome
-from ngi.studies.gpu_check.pixels import differences
+from ngi.studies.gpu_check.pixels import differences, pixels
 from ngi.studies.gpu_check.plan import Sizes, items
 from ngi.studies.gpu_check.record import Record
 from ngi.studies.gpu_check.runs import METHODS, run
 from tests.learn.command_line import run_module
 
-TRAINED = ("active_exploration", "uniform")
+TRAINED = ("active_exploration", "uniform", "ours", "ours_small_patches")
 ABOUT = {
     "machine": {"gpu": "Some GPU", "processor": "x", "backend": "cuda"},
     "versions": {"torch": "2"},
@@ -166,6 +167,24 @@ def test_pixels_differ_where_they_differ() -> None:
     assert by_name["pixels whose radiance differs"] == pytest.approx(50)
     mean = 100 * (brighter.mean() / radiance.mean() - 1).item()
     assert by_name["difference of mean radiance"] == pytest.approx(mean, rel=1e-3)
+
+
+def test_pixels_have_what_those_of_ours_have(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = []
+
+    def renderer(**options: Any) -> AnalyticRenderer:
+        made.append(options)
+        return AnalyticRenderer(dimensions=3, patch_size=16)
+
+    monkeypatch.setattr("ngi.studies.gpu_check.pixels.MitsubaRenderer", renderer)
+    (scene,) = shipped(["mirror"])
+    found = pixels(scene, resolution=16, samples=2)
+    assert [figure.median for figure in found.figures] == [0, 0, 0]
+    assert all((each["specular"], each["direct"]) == OF_OURS for each in made)
+    assert len(made) == 2
+
+
+OF_OURS = ("traced", "with_caustics")
 
 
 def test_at_full_size_it_measures_every_scene_method_and_part(tmp_path: Path) -> None:
