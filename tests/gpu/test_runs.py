@@ -48,7 +48,9 @@ RUNS = {
         *(*OURS, "sampler=predicted_from_buffers", "sampler.chains=4", "sampler.candidates=16"),
         *("sampler.uniform_first=8", "averaging=exponential"),
     ),
-    "ours, eager": (*OURS, "method=ours_eager", "sampler.chains=4", "seed=1"),
+    "ours, eager": (
+        *(*OURS, "method=ours_eager", "+renderer.samples_per_pixel=2", "sampler.chains=4"),
+    ),
     "cnsr": ("renderer=analytic", "method=cnsr", *SETS),
     "anf": ("renderer=analytic", "method=anf", *SEQUENCES),
 }
