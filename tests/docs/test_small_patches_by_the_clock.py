@@ -55,8 +55,28 @@ def test_what_looking_takes_is_what_the_runs_say() -> None:
     assert said(PAGE, r"Looking took ([\d.]+) to ([\d.]+) % of the time") == expected
 
 
+def test_what_runs_with_new_patches_to_the_end_had_is_what_they_say() -> None:
+    now, before = ends(), ends_of(FOLDER / "scarce_new_to_the_end.csv")
+    pairs = [list(zip(*map(errors_of, pair), strict=True)) for pair in (before, now)]
+    number = r"(\d+\.\d % ± \d+\.\d)"
+    words = rf"it was {number} on hard frames, {number} on their worst pixels, {number} on uniform"
+    expected = [in_words(over_scenes(*pair)) for pair in pairs[0]]
+    assert said(PAGE, rf"{words} frames and {number} on theirs") == tuple(expected)
+    by_method = list(zip(before, now, strict=True))
+    both = [
+        pd.concat([errors_of(a)[0], errors_of(b)[0].rename(index={0: 1}, level="seed")])
+        for a, b in by_method
+    ]
+    words = rf"the mean of both rounds is {number} on hard frames"
+    assert said(PAGE, words) == (in_words(over_scenes(*both)),)
+    less = [in_words(over_scenes(errors_of(a)[0], errors_of(b)[0])) for a, b in by_method]
+    words = rf"they have {number} less error on hard frames with uniform sampling and {number} with"
+    assert said(PAGE, words) == tuple(less)
+
+
 def test_what_positions_of_corners_had_is_what_their_runs_say() -> None:
-    (uniform, small), corners = ends(), ends_of(FOLDER / "scarce_corners.csv")
+    uniform, small = ends_of(FOLDER / "scarce_new_to_the_end.csv")
+    corners = ends_of(FOLDER / "scarce_corners.csv")
     hard, _, common, _ = zip(*map(errors_of, corners), strict=True)
     number = r"(\d+\.\d % ± \d+\.\d)"
     words = rf"it was {number} on hard frames and {number} on uniform ones"
@@ -65,7 +85,9 @@ def test_what_positions_of_corners_had_is_what_their_runs_say() -> None:
         [in_words(over_scenes(a, b)) for a, b in zip(*map(errors_of, pair), strict=True)]
         for pair in zip(corners, (uniform, small), strict=True)
     ]
-    words = rf"{number} less error on hard frames with uniform sampling and {number} with small"
+    words = (
+        rf"with centres, have {number} less error on hard frames with uniform sampling and {number}"
+    )
     assert said(PAGE, words) == (less[0][0], less[1][0])
     words = rf"than those had, {number} and {number} on uniform ones"
     assert said(PAGE, words) == (less[0][2], less[1][2])
