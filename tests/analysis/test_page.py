@@ -203,6 +203,7 @@ def test_the_same_runs_make_the_same_files(plain, tmp_path) -> None:
         assert (tmp_path / file).read_bytes() == (plain.output / file).read_bytes(), file
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_relmse_has_a_curve_where_it_was_measured(make_run, tmp_path) -> None:
     folder = make_run(change=lambda result: result.update(relmse={"hard": 0.0125, "uniform": 0.5}))
     table = pd.read_csv(folder / "metrics.csv")
@@ -216,6 +217,7 @@ def test_relmse_has_a_curve_where_it_was_measured(make_run, tmp_path) -> None:
     assert float(uniform.rpartition(" ")[2]) == 0.5
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_what_it_shows_is_escaped(make_run, tmp_path) -> None:
     name = '<img src=x onerror="alert(1)">&amp;'
     make_run(sampler=name)
