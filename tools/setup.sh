@@ -37,7 +37,9 @@ fi
     fail "pip could not install the dependencies; its message stands above"
 # On all cores, where pip compiles one file after the other; some are of other versions of Python.
 # Now, because containers often forbid it to later imports; the libraries' own tests are a fifth.
-"$VENV/bin/python" -m compileall -qq -j 0 -x '/tests/' "$VENV/lib" ngi analysis || true
+# Nothing here imports databricks, and mypy has a compiled twin beside each of its files.
+"$VENV/bin/python" -m compileall -qq -j 0 -x '/tests?/|/site-packages/(databricks|mypyc?)/' \
+    "$VENV/lib" ngi analysis || true
 
 # LPIPS needs AlexNet's weights; without them its column stays empty. LPIPS=no leaves them out.
 [ "${LPIPS:-yes}" = no ] || "$VENV/bin/python" -m ngi.evaluate.lpips_download || true
