@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 from hydra.utils import instantiate
 
+from ngi.config.values import check_values
 from ngi.explore import MarkovChains, PredictedLoss
 from ngi.files.resources import scene_folders
 from ngi.learn import PatchSamples, network_of
@@ -108,6 +109,12 @@ def test_every_experiment_says_its_command() -> None:
     for file in (CONF / "experiment").glob("*.yaml"):
         assert "# python -m ngi." in file.read_text().splitlines()[1], file
         composed(f"experiment={file.stem}")
+
+
+def test_every_key_that_an_experiment_adds_is_read() -> None:
+    """As of sweeps (test_sweeps.py); there are no others that add any."""
+    for file in (CONF / "experiment").glob("*.yaml"):
+        check_values(composed(f"experiment={file.stem}"))
 
 
 def test_a_scene_is_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,6 +8,7 @@ from hydra.utils import instantiate
 
 from ngi.config.build import reuse_policy
 from ngi.config.configuration import sweep_names
+from ngi.config.values import check_values
 from ngi.files.resources import root
 from ngi.learn import PatchSamples, network_of
 from ngi.render import AnalyticRenderer
@@ -36,6 +37,11 @@ def test_every_sweep_says_its_command(sweep: str) -> None:
     text = (root() / "sweeps" / f"{sweep}.yaml").read_text()
     assert f"python -m ngi.train -m +sweeps={sweep}" in text.splitlines()[1]
     assert composed(f"+sweeps={sweep}").hydra.sweeper.params
+
+
+@pytest.mark.parametrize("sweep", SWEEPS)
+def test_every_key_that_a_sweep_adds_is_read(sweep: str) -> None:
+    check_values(composed(f"+sweeps={sweep}"))
 
 
 def test_help_names_every_sweep() -> None:
