@@ -20,6 +20,8 @@ LEARNER = (
     "averaging=exponential",
 )
 """Everything of ours about learning that the paper does not have."""
+SHORT = ("budget.steps=24", "run.checkpoint_steps=5")
+"""Every kill costs a part of a run."""
 AIMED_AT = {"writing": 0.3, "at the end": 0.15}
 """Shares of the kills that wait for such a moment, however short it is; others wait for nothing."""
 
@@ -35,7 +37,7 @@ def killed(process: ForkServerProcess, folder: Path, *, after: float, aim: str |
     return process.exitcode != 0
 
 
-@pytest.mark.parametrize(("kills", "overrides"), [(50, ()), (25, LEARNER)])
+@pytest.mark.parametrize(("kills", "overrides"), [(50, SHORT), (25, (*SHORT, *LEARNER))])
 def test_runs_killed_at_many_moments_end_bit_for_bit_like_an_unbroken_one(
     tmp_path: Path, kills: int, overrides: tuple[str, ...]
 ) -> None:
