@@ -10,15 +10,10 @@ import pytest
 import ngi
 from ngi.cli import VERBS, main
 from ngi.config.unread_output import readers_may_leave
+from tests.learn.command_line import run_module
 
 ROOT = Path(__file__).parents[1]
 OF_HYDRA = ("train", "costs")
-
-
-def ngi_command(*arguments: str) -> "subprocess.CompletedProcess[str]":
-    return subprocess.run(
-        [sys.executable, "-m", "ngi", *arguments], capture_output=True, text=True, cwd=ROOT
-    )
 
 
 @pytest.fixture(autouse=True)
@@ -139,11 +134,11 @@ def test_help_is_there_before_what_the_work_needs_is_imported() -> None:
 
 
 @pytest.mark.parametrize("verb", OF_HYDRA)
-def test_so_do_those_of_hydra(verb: str) -> None:
-    answer = ngi_command(verb, "--help")
-    assert answer.returncode == 0, answer.stderr
-    assert f"ngi {verb} -m +sweeps=" in answer.stdout
-    assert "== Groups" in answer.stdout
+def test_so_do_those_of_hydra(verb: str, tmp_path: Path) -> None:
+    status, output = run_module("ngi", verb, "--help", folder=tmp_path)
+    assert status == 0, output
+    assert f"ngi {verb} -m +sweeps=" in output
+    assert "== Groups" in output
 
 
 @pytest.mark.parametrize("verb", ["view", "render", "video", "export"])
@@ -163,13 +158,15 @@ def test_a_verb_gets_its_arguments_and_gives_its_status(
     assert str(tmp_path) in capsys.readouterr().err
 
 
-def test_training_takes_the_same_words() -> None:
-    answer = ngi_command("train", "--cfg", "job", "budget=smoke", "scene=mirror")
-    assert answer.returncode == 0, answer.stderr
-    assert "name: mirror" in answer.stdout
+def test_training_takes_the_same_words(tmp_path: Path) -> None:
+    words = ("train", "--cfg", "job", "budget=smoke", "scene=mirror")
+    status, output = run_module("ngi", *words, folder=tmp_path)
+    assert status == 0, output
+    assert "name: mirror" in output
 
 
 def test_a_wrong_option_of_training_is_an_error() -> None:
-    answer = ngi_command("train", "sampler=no_such")
+    command = [sys.executable, "-m", "ngi", "train", "sampler=no_such"]
+    answer = subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
     assert answer.returncode == 1
     assert "sampler/no_such: there is no such option" in answer.stderr
