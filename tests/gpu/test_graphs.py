@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -128,6 +129,22 @@ def test_on_the_cpu_nothing_is_recorded(caplog: pytest.LogCaptureFixture) -> Non
 LONGER = ("budget.steps=24",)
 
 
+@pytest.fixture(scope="module")
+def launched(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """The folder of a run of these options that is launched kernel by kernel, on the GPU there is.
+
+    Several tests compare with the same one; it is trained once.
+    """
+
+    @cache
+    def made(*options: str) -> Path:
+        folder = tmp_path_factory.mktemp("launched") / "of_a_run"
+        trained(folder, *options, "trainer=fast")
+        return folder / "run"
+
+    return made
+
+
 def of_constant_rate(name: str) -> tuple[str, ...]:
     """The options of a run that is longer, and goes on to any length."""
     others = (option for option in RUNS[name] if not option.startswith("schedule"))
@@ -135,14 +152,16 @@ def of_constant_rate(name: str) -> tuple[str, ...]:
 
 
 @pytest.mark.parametrize("name", ["paper, metropolis", "ours", "ours, exploring", "cnsr"])
-def test_a_run_of_graphs_is_the_same_bit_for_bit(gpu: Ledger, tmp_path: Path, name: str) -> None:
+def test_a_run_of_graphs_is_the_same_bit_for_bit(
+    gpu: Ledger, tmp_path: Path, launched: Callable[..., Path], name: str
+) -> None:
     options = (*RUNS[name], *LONGER)
-    trained(tmp_path / "launched", *options, "trainer=fast")
+    expected = launched(*options)
     assert gpu.launches["graph"] == 0
     trained(tmp_path / "recorded", *options, "trainer=graphs")
     assert gpu.launches["graph"] > 8
     assert (len(gpu.looks) > 4) == ("ours" in name)
-    assert_same_run(tmp_path / "launched" / "run", tmp_path / "recorded" / "run")
+    assert_same_run(expected, tmp_path / "recorded" / "run")
 
 
 CAMERA = ("renderer._target_=tests.learn.moving_camera.moving_camera",)
@@ -177,11 +196,14 @@ def test_in_such_a_run_steps_on_stored_patches_wait_for_nothing(
 
 
 def test_steps_that_are_taken_back_and_again_are_the_same(
-    gpu: Ledger, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    gpu: Ledger,
+    tmp_path: Path,
+    launched: Callable[..., Path],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Whatever is the reason: here there is none."""
     options = (*RUNS["ours"], *LONGER)
-    trained(tmp_path / "at once", *options, "trainer=fast")
+    at_once = launched(*options)
     asked = []
 
     def admits(_: StepGuard, attempt: Attempt) -> bool:
@@ -192,7 +214,7 @@ def test_steps_that_are_taken_back_and_again_are_the_same(
     trained(tmp_path / "again", *options, "trainer=graphs", "run.checkpoint_steps=5")
     assert len(asked) > 10
     assert len(gpu.looks) > 4
-    assert_same_run(tmp_path / "at once" / "run", tmp_path / "again" / "run")
+    assert_same_run(at_once, tmp_path / "again" / "run")
 
 
 @pytest.mark.usefixtures("gpu")
