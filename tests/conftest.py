@@ -13,9 +13,12 @@ quick_kernels.use()
 
 
 LONGEST = (
-    *("render/test_shipped_scenes", "learn/test_killed", "view/test_browser"),
-    *("learn/test_multirun", "learn/test_interruption", "gpu/test_graphs"),
-    *("studies/gpu_check/test_gpu_check", "scene/test_updates_in_kernels"),
+    *("learn/test_killed", "view/test_browser", "scene/test_shipped_assets"),
+    *("render/test_shipped_scenes", "scene/test_reach", "learn/test_multirun"),
+    *("gpu/test_graphs", "render/test_recorded_scene", "docs/test_tutorials"),
+    *("analysis/test_page", "methods/anf/test_runs", "view/test_export"),
+    *("studies/gpu_check/test_gpu_check", "learn/test_interruption", "learn/test_resume"),
+    "scene/test_updates_in_kernels",
 )
 """Files that take half a minute and more. They begin first, so that none is left alone at the end.
 """
