@@ -11,12 +11,12 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from scipy.stats import t
 from tabulate import tabulate
 
 from analysis.pairs import pair_runs
 from analysis.runs import METRICS, find_runs
 from analysis.speedup import log_error_series, time_to_stay_below
+from analysis.statistics import estimate
 
 folder, method, baseline = sys.argv[1:4]
 runs = find_runs(Path(folder))[0]
@@ -25,10 +25,9 @@ runs = find_runs(Path(folder))[0]
 # %% Means and 95 % intervals over seeds
 def interval(values: list[float]) -> str:
     """Mean, and half the width of Student's interval where there are several values."""
-    if len(values) < 2:
-        return f"{np.mean(values):.3f}"
-    half = t.ppf(0.975, len(values) - 1) * np.std(values, ddof=1) / np.sqrt(len(values))
-    return f"{np.mean(values):.3f} ± {half:.3f}"
+    found = estimate(values)
+    half = "" if found.half_width is None else f" ± {found.half_width:.3f}"
+    return f"{found.mean:.3f}{half}"
 
 
 # %% A row per scene

@@ -9,6 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 from modelling.meshes import Mesh, lathe, rounded_box, sphere, surface
+from modelling.ornaments import rounded_profile
 
 Profile = list[tuple[float, float]]
 
@@ -24,21 +25,12 @@ BASE_RADIUS = {
 SEGMENTS = 32
 
 
-def softened(profile: Profile) -> np.ndarray:
-    """The corners of a profile cut off twice (Chaikin); its ends stay."""
-    p = np.array(profile, dtype=float)
-    for _ in range(2):
-        cut = np.stack([0.75 * p[:-1] + 0.25 * p[1:], 0.25 * p[:-1] + 0.75 * p[1:]], axis=1)
-        p = np.concatenate([p[:1], cut.reshape(-1, 2), p[-1:]])
-    return p
-
-
 def turned_body(kind: str, stem: Profile) -> Mesh:
     """A base of the kind's radius and above it the given stem, both in millimetres."""
     r = 1000 * BASE_RADIUS[kind]
     base = [(0, 0), (0.97 * r, 0), (1.02 * r, 1.5), (r, 5), (0.93 * r, 6.2), (0.86 * r, 6.8)]
     base += [(0.9 * r, 8), (0.84 * r, 10.5), (0.66 * r, 13)]
-    return lathe([tuple(p) for p in softened(base + stem) / 1000], SEGMENTS)
+    return lathe([tuple(p) for p in rounded_profile(base + stem, 2) / 1000], SEGMENTS)
 
 
 def collar(radius: float, height: float) -> Profile:
@@ -90,7 +82,9 @@ def bishop() -> list[Mesh]:
 
 def mitre() -> Mesh:
     """A drop with a slanting cut."""
-    profile = softened([(0.1, 50), (6, 51), (9, 56), (8.2, 62), (4.6, 68.5), (1.4, 72), (0.1, 72)])
+    profile = rounded_profile(
+        [(0.1, 50), (6, 51), (9, 56), (8.2, 62), (4.6, 68.5), (1.4, 72), (0.1, 72)], 2
+    )
     length = np.linspace(0, len(profile) - 1, 44)
     index = np.arange(len(profile))
     radius = np.interp(length, index, profile[:, 0]) / 1000
@@ -128,7 +122,12 @@ def spindle(path: Profile, across: list[float], thick: list[float], segments: in
 
     across: half width in the plane of the path; thick: half width in x; at every point.
     """
-    p = np.column_stack([softened(path), softened(list(zip(across, thick, strict=True)))]) / 1000
+    p = (
+        np.column_stack(
+            [rounded_profile(path, 2), rounded_profile(list(zip(across, thick, strict=True)), 2)]
+        )
+        / 1000
+    )
     tangent = np.gradient(p[:, :2], axis=0)
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
     angle = np.append(np.linspace(0, 2 * np.pi, segments + 1)[:-1], 0.0)

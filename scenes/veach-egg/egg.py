@@ -12,7 +12,6 @@ CUP_RIM = 0.036
 GAP = 0.0015
 """Between the glass and the cup."""
 
-BULB_RADIUS = 0.045
 HEAD_HEIGHT = 1.65
 """Of the bulb's centre above the floor."""
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import resource
 from collections.abc import Sequence
 from functools import partial
-from math import sqrt
 
 import numpy as np
 import torch
+from scipy.stats import linregress
 from tqdm import tqdm
 
 from ngi.machine.memory import resident_bytes
@@ -51,27 +51,18 @@ def growth_figures(used: Sequence[float], *, peak: float, of: str = "") -> list[
     """used: bytes after each batch."""
     patches = PATCHES * np.arange(1, len(used) + 1)
     settled = int(LEFT_OUT * len(used))
-    slope, error = line(patches[settled:], np.asarray(used[settled:], dtype=float))
+    line = linregress(patches[settled:], np.asarray(used[settled:], dtype=float))
     return [
-        figure(f"{of}growth per patch, least squares", [slope], "bytes"),
-        figure(f"{of}standard error of the growth", [error], "bytes"),
+        figure(f"{of}growth per patch, least squares", [line.slope], "bytes"),
+        figure(f"{of}standard error of the growth", [line.stderr], "bytes"),
         figure(
             f"{of}growth in {LONG:,} patches / peak",
-            [100 * LONG * slope / peak],
+            [100 * LONG * line.slope / peak],
             "%",
             "< 1",
         ),
         figure(f"{of}peak", [peak / 2**20], "MiB"),
     ]
-
-
-def line(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
-    """Slope of the least-squares line through points [n], n > 2, and its standard error."""
-    centred = x - x.mean()
-    spread = (centred**2).sum()
-    slope = (centred * y).sum() / spread
-    residuals = y - y.mean() - slope * centred
-    return float(slope), sqrt((residuals**2).sum() / (len(x) - 2) / spread)
 
 
 def memory_after_batch(batches: Batches) -> tuple[int, int]:

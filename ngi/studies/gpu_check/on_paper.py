@@ -30,7 +30,7 @@ from ngi.studies.benchmark.training import DIMENSIONS, OURS, PAPER, Learner, ran
 
 @dataclass(frozen=True)
 class Card:
-    """By its data sheet. bf16, tf32: dense products, FLOP/s; memory: bytes/s
+    """By its data sheet. bf16: dense products, FLOP/s; memory: bytes/s
 
     launch: seconds between two launches of small kernels by PyTorch; graph: within a CUDA graph.
     Both are rules of thumb, not of the data sheet.
@@ -38,13 +38,12 @@ class Card:
 
     name: str
     bf16: float
-    tf32: float
     memory: float
     launch: float = 5e-6
     graph: float = 1.5e-6
 
 
-H100 = Card("H100 SXM", bf16=989e12, tf32=495e12, memory=3.35e12)
+H100 = Card("H100 SXM", bf16=989e12, memory=3.35e12)
 
 PAPER_STEPS, PAPER_PATCHES, PAPER_SAMPLES = 236_000, 37_000, (200, 24_000)
 """Of the paper's whole training, its scenes' samples per pixel being between these."""

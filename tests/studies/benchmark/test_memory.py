@@ -2,21 +2,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.stats import linregress
 
 from ngi.machine.backend import llvm_problem
 from ngi.studies.benchmark import PATCHES, memory
 from ngi.studies.benchmark.scenes import shipped
 
 MIB = 2**20
-
-
-def test_the_line_is_scipys() -> None:
-    generator = np.random.default_rng(0)
-    x = generator.random(50)
-    y = 3 * x + generator.normal(size=50)
-    expected = linregress(x, y)
-    assert memory.line(x, y) == pytest.approx((expected.slope, expected.stderr))
 
 
 def test_growth_is_that_after_the_first_tenth() -> None:
