@@ -102,12 +102,12 @@ def subject(
     scene: str | None,
     supersampled_edges: bool,
 ) -> Subject:
-    """name: for titles, after the end of the folder's, which tells runs apart
+    """name: for titles, before the end of the folder's, which tells runs apart
     description: of the scene; None for closed formulas, whose variables have no names
     """
     frames = renderer.hard_frames().tolist()
     return Subject(
-        name=f"{Path(*folder.resolve().parts[-2:])}: {name}",
+        name=f"{name} ({Path(*folder.resolve().parts[-2:])})",
         folder=folder,
         controls=unnamed_controls(renderer.dimensions)
         if description is None

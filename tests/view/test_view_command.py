@@ -66,4 +66,4 @@ def test_the_page_knows_how_edges_are_shown(
     monkeypatch.setattr("ngi.view.page.Page", page)
     assert main(["run=run", f"supersampled_edges={supersampled}"]) == 130
     assert [each.supersampled_edges for each in shown] == [supersampled]
-    assert shown[0].name == "method=ours/seed=0: plane, step 0"
+    assert shown[0].name == "plane, step 0 (method=ours/seed=0)"
