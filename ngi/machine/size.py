@@ -16,7 +16,7 @@ WARMUP_STEPS = 30
 """Of the learning rate, where the budget has room for them."""
 
 
-def network_width(accelerator: str = "auto") -> int:
+def network_width(accelerator: str) -> int:
     """Features of a hidden layer: 512 on a GPU (paper, Sec. 4.2), 128 on a processor.
 
     accelerator: the trainer's; 'cpu' leaves a GPU out
@@ -24,7 +24,7 @@ def network_width(accelerator: str = "auto") -> int:
     return 512 if trains_on_gpu(accelerator) else 128
 
 
-def network_depth(accelerator: str = "auto") -> int:
+def network_depth(accelerator: str) -> int:
     """Number of hidden layers: 8 on a GPU (paper, Sec. 4.2), 6 on a processor."""
     return 8 if trains_on_gpu(accelerator) else 6
 

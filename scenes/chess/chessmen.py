@@ -122,12 +122,8 @@ def spindle(path: Profile, across: list[float], thick: list[float], segments: in
 
     across: half width in the plane of the path; thick: half width in x; at every point.
     """
-    p = (
-        np.column_stack(
-            [rounded_profile(path, 2), rounded_profile(list(zip(across, thick, strict=True)), 2)]
-        )
-        / 1000
-    )
+    widths = list(zip(across, thick, strict=True))
+    p = np.column_stack([rounded_profile(path, 2), rounded_profile(widths, 2)]) / 1000
     tangent = np.gradient(p[:, :2], axis=0)
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
     angle = np.append(np.linspace(0, 2 * np.pi, segments + 1)[:-1], 0.0)

@@ -54,7 +54,7 @@ def test_references_are_shared_by_all_devices(tmp_path: Path) -> None:
 @pytest.mark.usefixtures("gpu")
 def test_a_result_names_the_card_and_sizes_are_the_papers() -> None:
     assert provenance(backend="none")["machine"]["gpu"] == NAME
-    assert (network_width(), network_depth()) == (512, 8)
+    assert (network_width("auto"), network_depth("auto")) == (512, 8)
 
 
 @pytest.mark.usefixtures("gpu")

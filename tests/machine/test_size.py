@@ -43,7 +43,7 @@ def test_a_gpu_gets_the_papers_network(
     gpu: bool, size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(torch.cuda, "is_available", lambda: gpu)
-    assert (network_depth(), network_width()) == size
+    assert (network_depth("auto"), network_width("auto")) == size
 
 
 def test_a_pinned_process_has_the_cores_it_is_pinned_to() -> None:
