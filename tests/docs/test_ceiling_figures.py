@@ -86,7 +86,7 @@ def test_what_the_scenes_together_say_is_what_is_said_of_them() -> None:
         assert said(page, pattern) == tuple(in_words(estimate_of(found.loc[row])) for row in rows)
     for other, pattern in (
         ("docs/exploration-ceiling/from-buffers.md", rf"took \[{number} off hard frames\]"),
-        ("docs/guide/sampler.md", rf"worth choosing on those scenes \({number} on hard frames"),
+        ("docs/guide/sampler.md", rf"proportion to its true error \({number} on hard frames"),
     ):
         (shown,) = said(other, pattern)
         assert shown == in_words(estimate_of(found.loc[1600, "oracle", "hard_error"]))

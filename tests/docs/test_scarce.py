@@ -60,7 +60,7 @@ def test_what_an_oracle_takes_off_dear_patches_is_what_the_runs_say() -> None:
     measured = tuple(as_shown(oracle).lstrip("−").split(" %")[0].split(" ± "))
     for where, before, after in (
         ("README.md", "few and clean ", ": the mean"),
-        ("docs/guide/sampler.md", r"proportion to their true error \[", r"\]"),
+        ("docs/guide/sampler.md", r"proportion to their true error, takes \[", r"\]"),
         ("docs/exploration-ceiling/README.md", "the oracle takes ", " off hard frames after 256"),
     ):
         assert said(where, rf"{before}(\d\.\d) % ± (\d\.\d){after}") == measured
