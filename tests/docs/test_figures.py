@@ -67,7 +67,7 @@ def test_ours_is_better_after_a_minute_on_as_many_scenes_as_is_said(page: str) -
 
 def test_a_frame_of_ours_takes_the_share_of_the_denoisers_time_that_is_said() -> None:
     measured = range_of("ours / paths and denoiser")
-    readme = r"A frame takes ours (0\.\d+) to (0\.\d+) of the denoiser's time, on the six"
+    readme = r"A frame of ours takes (0\.\d+) to (0\.\d+) of the denoiser's time, on the six"
     assert said("README.md", readme) == measured
     page = r"A frame of ours takes (0\.\d+) to (0\.\d+) of the denoiser's time"
     assert said("docs/learner/README.md", page) == measured
@@ -115,7 +115,7 @@ def test_the_readme_says_of_predicted_losses_what_their_table_says() -> None:
     eager = rf"base .+?predicted loss, eager .+?{less} \| +{less} \| +(\d+\.\d) \|"
     *tail, mean, interval, ratio = said("docs/exploration-ceiling/eager/errors.md", eager)
     assert float(mean) < float(interval)
-    words = r"(\d+) % ± (\d+) less error on the worst frames\]\S+ and as little .+? in 1/(\d+) of"
+    words = r"(\d+) % ± (\d+) less error on the worst frames\]\S+ and no more .+? in 1/(\d+) of"
     assert said("README.md", words) == tuple(f"{float(each):.0f}" for each in (*tail, ratio))
 
 
@@ -132,7 +132,9 @@ def test_the_readme_says_of_the_oracle_what_the_study_says() -> None:
 
 def test_the_page_of_results_counts_the_runs_that_there_are() -> None:
     (total,) = said("docs/results.md", r"(\d+) of the runs of `make report`")
-    counts = said("docs/small/README.md", r"three seeds, (\d+) runs, (\d+) of .+? and (\d+) of")
+    counts = said(
+        "docs/small/README.md", r"three seeds, (\d+) runs, plus (\d+) of .+? and (\d+) of"
+    )
     assert int(total) == sum(map(int, counts))
     effect = said("docs/results.md", r"the difference is (\+0\.\d %) \((−\d\.\d) to (\+\d\.\d)\)")
     assert effect == said(
@@ -210,7 +212,8 @@ def test_what_is_said_of_the_rare_is_what_its_runs_say() -> None:
         assert difference.n == 3
         figures += [f"{-100 * difference.mean:.0f}", f"{100 * difference.half_width:.0f}"]
     percent = r"(\d+) % ± (\d+)"
-    pattern = rf"ends with {percent} less error on frames that have it.+?chains with {percent} less"
+    with_light = rf"ends with {percent} less error on frames with the light"
+    pattern = rf"{with_light}.+?chains with {percent} less"
     for page in ("README.md", "docs/results.md"):
         assert said(page, pattern) == tuple(figures)
     lit = (last["lit_patches"] / last["patches_traced"]).groupby("method").mean()

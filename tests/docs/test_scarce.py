@@ -59,7 +59,7 @@ def test_what_an_oracle_takes_off_dear_patches_is_what_the_runs_say() -> None:
     oracle = by_oracle_of_dear_patches(256, 1600)
     measured = tuple(as_shown(oracle).lstrip("−").split(" %")[0].split(" ± "))
     for where, before, after in (
-        ("README.md", "few and clean ", ": the mean"),
+        ("README.md", "few and clean ", r" \(means over the scenes"),
         ("docs/guide/sampler.md", r"proportion to their true error, takes \[", r"\]"),
         ("docs/exploration-ceiling/README.md", "the oracle takes ", " off hard frames after 256"),
     ):
