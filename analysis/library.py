@@ -13,15 +13,17 @@ from analysis.methods import name_methods
 from analysis.runs import FURTHER, METRICS, SETS, Run, find_runs
 from analysis.step_log import read_steps
 
-KEYS = ["scene", "method", "seed"]
+KEYS = ["scene", "method", "seed", "folder"]
+"""Which run a row is of: its folder alone tells it from all others."""
 
 
 @dataclass(frozen=True)
 class Results:
-    """The runs below a folder. Every frame has the columns scene, method and seed.
+    """The runs below a folder. Every frame has the columns scene, method, seed and folder.
 
-    warnings: what was left out, and why. Runs that a report would refuse to compare (other
-    protocols, other references) are here too; the columns of `runs` tell them apart.
+    warnings: what was left out, and why; and which runs have the same scene, method and seed, so
+    that only the column folder, a string, tells them apart. Runs that a report would refuse to
+    compare (other protocols, other references) are here too; the columns of `runs` say which.
     """
 
     found: tuple[Run, ...]
@@ -29,7 +31,7 @@ class Results:
 
     @cached_property
     def runs(self) -> pd.DataFrame:
-        """A row per run: folder, labels, costs, provenance.
+        """A row per run: labels, costs, provenance.
 
         Columns of nested entries are joined by dots: 'label.reuse', 'seconds.render', 'commit',
         'machine.processor', 'versions.torch', 'protocol.name'. Without `config` and the errors.
@@ -41,8 +43,8 @@ class Results:
                 for run in self.found
             ]
         )
-        folders = [str(run.folder) for run in self.found]
-        return pd.concat([_keys(self.found), pd.DataFrame({"folder": folders}), rows], axis=1)
+        keys = pd.DataFrame([_key(run) for run in self.found], columns=KEYS)
+        return pd.concat([keys, rows], axis=1)
 
     @cached_property
     def evaluations(self) -> pd.DataFrame:
@@ -95,9 +97,9 @@ class Results:
         )
 
     def _tables(self, tables: Sequence[pd.DataFrame]) -> pd.DataFrame:
-        """One below the other, each with its run's scene, method and seed in front."""
+        """One below the other, each with its run's `KEYS` in front."""
         keyed = [
-            pd.DataFrame({"scene": run.scene, "method": run.method, "seed": run.seed}, table.index)
+            pd.DataFrame(dict(zip(KEYS, _key(run), strict=True)), table.index)
             .join(table)
             .reset_index(drop=True)
             for run, table in zip(self.found, tables, strict=True)
@@ -112,9 +114,24 @@ def load_runs(folder: Path | str) -> Results:
     Raises ValueError for a folder that is missing or holds no finished run, and for result files
     of another schema version.
     """
-    runs, warnings = find_runs(Path(folder))
-    return Results(tuple(name_methods(runs)), tuple(warnings))
+    found, warnings = find_runs(Path(folder))
+    runs = name_methods(found)
+    return Results(tuple(runs), (*warnings, *_repeated(runs)))
 
 
-def _keys(runs: Sequence[Run]) -> pd.DataFrame:
-    return pd.DataFrame([(run.scene, run.method, run.seed) for run in runs], columns=KEYS)
+def _key(run: Run) -> tuple[str, str, int, str]:
+    return run.scene, run.method, run.seed, str(run.folder)
+
+
+def _repeated(runs: Sequence[Run]) -> list[str]:
+    """A warning per scene, method and seed that several runs have, with their folders."""
+    folders: dict[tuple[str, str, int], list[str]] = {}
+    for run in runs:
+        scene, method, seed, folder = _key(run)
+        folders.setdefault((scene, method, seed), []).append(folder)
+    return [
+        f"{len(those)} runs of {scene}, {method}, seed {seed}, which only the column folder tells "
+        f"apart: {', '.join(those)}"
+        for (scene, method, seed), those in folders.items()
+        if len(those) > 1
+    ]

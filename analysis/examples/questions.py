@@ -13,6 +13,8 @@ import pandas as pd
 from analysis import load_runs
 
 results = load_runs(sys.argv[1] if len(sys.argv) > 1 else "outputs/demo")
+for warning in results.warnings:
+    print(f"warning: {warning}", file=sys.stderr)
 evaluations, frames = results.evaluations, results.frames
 means = evaluations.query("statistic == 'mean' and set == 'hard' and metric == 'mape'")
 

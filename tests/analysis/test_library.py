@@ -1,3 +1,4 @@
+import json
 import math
 import subprocess
 import sys
@@ -10,6 +11,7 @@ from analysis import load_runs
 from analysis.runs import FURTHER
 
 REPOSITORY = Path(__file__).resolve().parents[2]
+HARD_MAPE = "set == 'hard' and metric == 'mape' and statistic == 'mean'"
 
 
 @pytest.fixture
@@ -74,14 +76,44 @@ def test_steps_are_read_where_there_are_any(folder) -> None:
     table = pd.DataFrame({"step": [1, 2], "run_seconds": [0.1, 0.2], "loss": [0.5, 0.25]})
     table.to_csv(with_steps / "steps.csv", index=False)
     steps = load_runs(folder).steps
-    logged = ["scene", "method", "seed", *table]
+    logged = ["scene", "method", "seed", "folder", *table]
     assert steps.drop(columns=logged).isna().all(axis=None)  # what a run did not log
     assert steps[logged].values.tolist() == [
-        ["chess", "uniform", 0, 1, 0.1, 0.5],
-        ["chess", "uniform", 0, 2, 0.2, 0.25],
+        ["chess", "uniform", 0, str(with_steps), 1, 0.1, 0.5],
+        ["chess", "uniform", 0, str(with_steps), 2, 0.2, 0.25],
     ]
     (with_steps / "steps.csv").unlink()
-    assert load_runs(folder).steps.columns.tolist() == ["scene", "method", "seed"]
+    assert load_runs(folder).steps.columns.tolist() == ["scene", "method", "seed", "folder"]
+
+
+def test_runs_of_one_scene_method_and_seed_are_told_apart_by_their_folders(
+    makers_below, tmp_path
+) -> None:
+    """Two sweeps with the same methods and seeds, the second with a tenth of the errors."""
+    ends = {}
+    for sweep, quality in (("small", 1.0), ("small-model-clock", 10.0)):
+        run = makers_below(tmp_path / sweep)[0](method="uniform", quality=quality)
+        pd.DataFrame({"step": [1], "run_seconds": [0.1], "loss": [quality]}).to_csv(
+            run / "steps.csv", index=False
+        )
+        last = pd.read_csv(run / "metrics.csv").iloc[-1]
+        frame = json.loads((run / "result.json").read_text())["frames"][0]
+        ends[str(run)] = last["hard_mape"], frame["mape"], quality
+    makers_below(tmp_path / "small")[0](method="uniform", seed=1)
+    results = load_runs(tmp_path)
+    found = {
+        folder: (
+            results.evaluations.query(f"folder == {folder!r} and {HARD_MAPE}")["value"].iloc[-1],
+            results.frames.query(f"folder == {folder!r} and metric == 'mape'")["value"].iloc[0],
+            results.steps.query(f"folder == {folder!r}")["loss"].item(),
+        )
+        for folder in ends
+    }
+    assert found == ends
+    assert results.runs.columns.tolist().count("folder") == 1
+    (warning,) = results.warnings
+    assert all(folder in warning for folder in ends)
+    assert "mirror, uniform, seed 0" in warning
 
 
 def test_what_was_left_out_is_known(folder, make_run) -> None:
