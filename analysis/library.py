@@ -34,7 +34,8 @@ class Results:
         """A row per run: labels, costs, provenance.
 
         Columns of nested entries are joined by dots: 'label.reuse', 'seconds.render', 'commit',
-        'machine.processor', 'versions.torch', 'protocol.name'. Without `config` and the errors.
+        'machine.processor', 'versions.torch', 'protocol.name'. The rest of result.json
+        is in the other frames.
         """
         left_out = {"config", "frames", "metrics", "seed"}
         rows = pd.json_normalize(
@@ -43,8 +44,22 @@ class Results:
                 for run in self.found
             ]
         )
-        keys = pd.DataFrame([_key(run) for run in self.found], columns=KEYS)
-        return pd.concat([keys, rows], axis=1)
+        return pd.concat([self._keys(), rows], axis=1)
+
+    @cached_property
+    def configs(self) -> pd.DataFrame:
+        """A row per run: its whole configuration, defaults too.
+
+        A column per setting, 'model.hidden_features', 'optimizer.lr'; NaN where a run has none of
+        that name.
+        """
+        settings = pd.json_normalize(
+            [
+                {key: value for key, value in run.result["config"].items() if key != "seed"}
+                for run in self.found
+            ]
+        )
+        return pd.concat([self._keys(), settings], axis=1)
 
     @cached_property
     def evaluations(self) -> pd.DataFrame:
@@ -95,6 +110,9 @@ class Results:
                 for run in self.found
             ]
         )
+
+    def _keys(self) -> pd.DataFrame:
+        return pd.DataFrame([_key(run) for run in self.found], columns=KEYS)
 
     def _tables(self, tables: Sequence[pd.DataFrame]) -> pd.DataFrame:
         """One below the other, each with its run's `KEYS` in front."""

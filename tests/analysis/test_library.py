@@ -9,6 +9,7 @@ import pytest
 
 from analysis import load_runs
 from analysis.runs import FURTHER
+from tests.analysis.changes import set_value
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 HARD_MAPE = "set == 'hard' and metric == 'mape' and statistic == 'mean'"
@@ -32,6 +33,28 @@ def test_runs_have_labels_costs_and_provenance(folder) -> None:
     assert (row["run_seconds"], row["steps"], row["seconds.render"]) == (241.0, 1010, 100.0)
     assert row["scene_hash"] == "mirror-files"
     assert Path(row["folder"]).is_dir()
+
+
+def test_configs_have_a_column_for_each_setting(make_run, tmp_path) -> None:
+    """A sweep of two widths, whose runs are told apart by a string alone, and path tracing."""
+    for width in (64, 128):
+        config = {"seed": 0, "model": {"hidden_features": width, "bounds": [0, 1]}}
+        make_run(
+            overrides=f"model.hidden_features={width}",
+            change=set_value("config", value=config),
+        )
+    make_run(sampler="none")
+    results = load_runs(tmp_path)
+    keys = ["scene", "method", "seed", "folder"]
+    assert results.configs[keys].equals(results.runs[keys])
+    settings = results.configs.drop(columns=keys).set_index(results.configs["method"])
+    assert set(settings) == {"model.hidden_features", "model.bounds"}
+    widths = settings["model.hidden_features"]
+    assert widths.drop("none").to_dict() == {
+        "uniform, model.hidden_features=64": 64,
+        "uniform, model.hidden_features=128": 128,
+    }
+    assert math.isnan(widths["none"])
 
 
 def test_evaluations_are_a_value_a_row(folder) -> None:
