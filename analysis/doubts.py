@@ -33,8 +33,8 @@ def comparison_warnings(runs: Sequence[Run]) -> list[str]:
     warnings = _of_different_settings(runs)
     if diverged := [str(run.folder) for run in runs if any(map(run.diverged, SETS))]:
         warnings.append(
-            f"{len(diverged)} run(s) ended with errors that are not finite; curves and times to "
-            f"equal error are without them: {', '.join(diverged)}"
+            f"{len(diverged)} run(s) ended with errors that are not finite, and so do means over "
+            f"their seeds; curves and times to equal error are without them: {', '.join(diverged)}"
         )
     for scene in sorted({run.scene for run in runs}):
         trained = [run for run in runs if run.scene == scene and run.result["steps"]]

@@ -38,6 +38,11 @@ class Summary:
     def is_method(self) -> bool:
         return bool(self.runs)
 
+    @property
+    def diverged(self) -> int:
+        """Runs that ended with errors that are not finite; means over the seeds are not, either."""
+        return sum(any(map(run.diverged, SETS)) for run in self.runs)
+
 
 def summarise(runs: Sequence[Run]) -> list[Summary]:
     """One summary per scene and method, and per scene one of the reference noise, in order."""
@@ -150,6 +155,7 @@ def to_frame(summaries: Sequence[Summary]) -> pd.DataFrame:
             row[f"{key}_interval"] = None if value is None else value.half_width
         if summary.runs:
             first = summary.runs[0]
+            row["diverged"] = summary.diverged
             row |= {field: first.label[field] for field in ("sampler", *DISTINCTIONS)}
             row["protocol"] = first.result["protocol"]["name"]
         rows.append(row)

@@ -110,7 +110,7 @@ def _table(
         cells = [
             Cell(summary.scene),
             Cell(method_title(summary.method)),
-            Cell(str(len(summary.runs) or "")),
+            Cell(_seeds(summary)),
         ]
         for key in keys:
             value = summary.values.get(key)
@@ -118,6 +118,12 @@ def _table(
             cells.append(Cell(MISSING if value is None else text(value), best))
         rows.append(tuple(cells))
     return Table(title, ("scene", "method", "n", *keys.values()), tuple(rows), 2)
+
+
+def _seeds(summary: Summary) -> str:
+    """'3', or '3 (1 diverged)'; nothing for the reference noise."""
+    n = str(len(summary.runs) or "")
+    return f"{n} ({summary.diverged} diverged)" if summary.diverged else n
 
 
 def _is_best(value: Estimate | None, key: str, rivals: Sequence[Summary]) -> bool:

@@ -1,5 +1,6 @@
 import json
 import math
+import re
 
 import pandas as pd
 import pytest
@@ -193,6 +194,36 @@ def test_a_mean_that_is_not_finite_is_never_the_best(make_run, tmp_path, bad, fi
     make_run(sampler="b", **({} if first else {"change": spoil}))
     (a, b, _) = error_table(summarise(name_methods(find_runs(tmp_path)[0]))).rows
     assert (a[3].best, b[3].best) == (not first, first)
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_tables_count_the_seeds_that_diverged(make_run, tmp_path) -> None:
+    """Of two methods with three seeds, one seed of the first ends with hard frames of NaN."""
+
+    def spoil(result: dict) -> None:
+        for metric in METRICS:
+            result["metrics"]["hard"][metric].update(mean=math.nan, worst5=math.nan)
+
+    for seed in range(3):
+        make_run(seed=seed, sampler="steady")
+        file = make_run(seed=seed, **({"change": spoil} if seed == 1 else {})) / "metrics.csv"
+        if seed == 1:
+            table = pd.read_csv(file)
+            hard = [name for name in table if name.startswith("hard")]
+            table.loc[len(table) - 1, hard] = math.nan
+            table.to_csv(file, index=False)
+    report = tmp_path / "report"
+    text = write_report(tmp_path / "runs", report).text
+    counts = pd.read_csv(report / "results.csv").set_index("method")["diverged"]
+    assert counts.drop("reference noise").to_dict() == {"uniform": 1, "steady": 0}
+    written = {name: (report / name).read_text() for name in ("results.md", "results.tex")}
+    for name, content in {"terminal": text, **written}.items():
+        rows = [line for line in content.splitlines() if "mirror" in line and "nan" in line]
+        assert rows, name
+        assert all("3 (1 diverged)" in row for row in rows), name
+        assert not re.search(r"steady\W.*diverged", content), name
+    page = (report / "index.html").read_text()
+    assert page.count("<td>3 (1 diverged)</td>") == 5  # two tables of either set, and the costs
 
 
 def test_numbers_have_three_significant_digits() -> None:
