@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
-import re
 from collections.abc import Callable
 from pathlib import Path
 from textwrap import fill
@@ -19,38 +17,10 @@ from omegaconf import DictConfig, OmegaConf
 import ngi
 from ngi.config.build import plain
 from ngi.files.resources import cache_folder, root
+from ngi.files.run_names import run_group, run_name, said_overrides
 from ngi.machine.precision import fast_precision
 from ngi.machine.size import bootstrap_batches, network_depth, network_width, warmup_steps
 from ngi.scene import scenes
-
-LONGEST = 100
-"""Characters; longer names are cut, and told apart by a hash."""
-
-
-def said_overrides(overrides: str | None) -> str:
-    """'sampler=uniform,model.hidden_features=64' in a folder's letters; 'default' for no override.
-
-    Of any length: by these words runs made in one way are told from others.
-    """
-    name = re.sub(r"[^\w.,=+-]+", "_", (overrides or "").replace("+", "")).strip("_,")
-    return name or "default"
-
-
-def run_name(overrides: str | None) -> str:
-    """The same as a folder name, cut where it is too long for one."""
-    name = said_overrides(overrides)
-    if len(name) <= LONGEST:
-        return name
-    return f"{name[:LONGEST]}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"
-
-
-def run_group(experiment: str | None, budget: str, clock: str) -> str:
-    """The folder of runs that belong together: the experiment, or else the budget.
-
-    Times of two clocks are not compared: counted ones ('model') have a folder of their own.
-    """
-    group = experiment or budget
-    return group if clock == "wall" else f"{group}-{clock}-clock"
 
 
 def choice(group: str, *, _root_: DictConfig) -> Any:

@@ -109,7 +109,7 @@ class MLflow(LightningLogger):
         logger = partial(MLFlowLogger, experiment_name=self._experiment, tracking_uri=self._uri)
         new = logger(
             run_name=shown_name(label),
-            tags={"group": group(label, self._options), "job_type": job_type(label)},
+            tags={"group": group(label, settings, self._options), "job_type": job_type(label)},
         )
 
         def begun() -> str:

@@ -15,6 +15,7 @@ from ngi.evaluate import SETS, Comparison, Evaluation
 from ngi.files.durable import write_atomically
 from ngi.files.row_log import RowLog
 from ngi.files.run_folder import TRACKED
+from ngi.files.run_names import run_group, shortened
 from ngi.learn.tracker import Row, Tracker
 
 _logger = logging.getLogger(__name__)
@@ -204,19 +205,24 @@ def nested(
     return {**chosen, **{k: label[k] for k in ("seed", "overrides")}, "settings": settings}
 
 
-def group(label: dict[str, Any], options: Mapping[str, Any]) -> str:
-    """Runs that belong together: those of a sweep, an experiment, or else a budget."""
-    return str(options.get("sweeps") or options.get("experiment") or label["budget"])
+def group(label: dict[str, Any], settings: dict[str, Any], options: Mapping[str, Any]) -> str:
+    """Runs that belong together: of a sweep, an experiment or else a budget, timed by one clock."""
+    within = options.get("sweeps") or options.get("experiment")
+    return run_group(within, label["budget"], settings["budget"]["clock"])
+
+
+LONGEST_JOB_TYPE = 55
+"""Characters: with the hash of one that is cut 64, and W&B takes no more."""
 
 
 def job_type(label: dict[str, Any]) -> str:
-    """What tells the runs of a sweep apart beside scene and seed: the method, with the sampler that
-    it was given in place of its own ('ours, sampler=uniform').
+    """What tells the runs of a group apart beside scene and seed: the method, or else the sampler,
+    and whatever else was overridden ('ours, sampler=uniform', 'uniform, model.hidden_features=64').
     """
-    if not label["method"]:
-        return str(label["sampler"])
-    given = [word for word in label["overrides"].split(",") if word.startswith("sampler=")]
-    return ", ".join([label["method"], *given])
+    told = "method=" if label["method"] else "sampler="
+    words = [word for word in label["overrides"].split(",") if not word.startswith(told)]
+    others = [word for word in words if word != "default"]
+    return shortened(", ".join([label["method"] or label["sampler"], *others]), LONGEST_JOB_TYPE)
 
 
 def shown_name(label: dict[str, Any]) -> str:

@@ -33,7 +33,7 @@ class WeightsAndBiases(Remote):
     Errors are shown against run time, losses against steps. The summary has every metric's last
     value, and its lowest below 'best/'. Each evaluation brings a sheet of predictions, references
     and error maps of the hard frames, and the error maps one by one. Runs are grouped by sweep, or
-    else by experiment or budget; their job type is the method.
+    else by experiment or budget; their job type is what else they differ in beside scene and seed.
 
     An interrupted run goes on as the same one: its id is in tracker.json. Offline, each start has a
     folder of its own below wandb/ of the run's folder, which `wandb sync` joins.
@@ -84,7 +84,7 @@ class WeightsAndBiases(Remote):
             id=None if by_agent else kept_id(folder, "wandb", lambda: token_hex(4)),
             resume=None if by_agent else "allow",
             config=nested(label, settings, self._options),
-            group=group(label, self._options),
+            group=group(label, settings, self._options),
             job_type=job_type(label),
             name=shown_name(label),
             tags=[f"{key}={label[key]}" for key in ("scene", "sampler", "seed")],

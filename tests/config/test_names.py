@@ -1,6 +1,6 @@
 import pytest
 
-from ngi.config.configuration import LONGEST, run_group, run_name
+from ngi.files.run_names import LONGEST, run_group, run_name
 from tests.config.command_line import composed
 
 

@@ -24,6 +24,7 @@ LABEL = {
     "overrides": "default",
     "seed": 0,
 }
+SETTINGS = {"budget": {"clock": "wall"}}
 
 
 class FakeArtifact:
@@ -74,7 +75,7 @@ def watch(monkeypatch, tmp_path):
         wandb = FakeWandb(trouble)
         monkeypatch.setitem(sys.modules, "wandb", wandb)
         watched = wandb_tracker(mode="online")
-        watched.start(folder=tmp_path, settings={}, label=LABEL)
+        watched.start(folder=tmp_path, settings=SETTINGS, label=LABEL)
         return wandb, watched
 
     return start
@@ -186,7 +187,7 @@ def test_without_wandb_the_run_does_not_start(monkeypatch, tmp_path) -> None:
     monkeypatch.setitem(sys.modules, "wandb", None)  # as if it were not installed
     watched = wandb_tracker()
     with pytest.raises(RuntimeError, match=r"tracker=wandb: .* choose tracker=local"):
-        watched.start(folder=tmp_path, settings={}, label=LABEL)
+        watched.start(folder=tmp_path, settings=SETTINGS, label=LABEL)
     watched.finish(failed=True)
 
 
@@ -194,7 +195,7 @@ def test_one_of_several_steps_is_passed_on(monkeypatch, tmp_path) -> None:
     wandb = FakeWandb()
     monkeypatch.setitem(sys.modules, "wandb", wandb)
     watched = wandb_tracker(every=3)
-    watched.start(folder=tmp_path, settings={}, label=LABEL)
+    watched.start(folder=tmp_path, settings=SETTINGS, label=LABEL)
     for step in range(1, 10):
         watched.step({"step": step, "loss": 0.5})
     watched.finish(failed=False)
@@ -219,7 +220,7 @@ def test_what_to_install_is_said(monkeypatch, tmp_path, watched) -> None:
     name = type(watched).extra
     message = rf"tracker={name}: {name} is not installed; `pip install .* -e .*\[{name}\].`"
     with pytest.raises(RuntimeError, match=message):
-        watched.start(folder=tmp_path, settings={}, label=LABEL)
+        watched.start(folder=tmp_path, settings=SETTINGS, label=LABEL)
     watched.finish(failed=True)
 
 
@@ -236,15 +237,37 @@ def test_runs_belong_together_by_sweep_experiment_or_budget() -> None:
         ({"experiment": "demo"}, "demo"),
         ({"experiment": None}, "b"),
     ):
-        assert remote.group(LABEL, options) == expected
-    assert [remote.job_type({**LABEL, "method": m}) for m in ("ours", None)] == ["ours", "m"]
+        assert remote.group(LABEL, SETTINGS, options) == expected
+        counted = {"budget": {"clock": "model"}}
+        assert remote.group(LABEL, counted, options) == f"{expected}-model-clock"
 
 
-def test_means_over_seeds_are_of_one_sampler() -> None:
-    """Where samplers of a method are swept over, curves grouped by job type would mix them else."""
-    label = {**LABEL, "method": "ours", "sampler": "mine", "overrides": "a=b,sampler=mine,c=d"}
-    assert remote.job_type(label) == "ours, sampler=mine"
-    assert remote.shown_name(label) == "s/ours, sampler=mine/0"
+@pytest.mark.parametrize(
+    ("method", "overrides", "expected"),
+    [
+        ("ours", "default", "ours"),
+        ("ours", "method=ours", "ours"),
+        ("ours", "a=b,sampler=mine,method=ours,c=d", "ours, a=b, sampler=mine, c=d"),
+        (None, "default", "mine"),
+        (None, "a=b,sampler=mine,c=d", "mine, a=b, c=d"),
+    ],
+)
+def test_means_over_seeds_are_of_runs_made_alike(method, overrides, expected) -> None:
+    """What is swept over tells curves apart that are grouped by job type."""
+    label = {**LABEL, "method": method, "sampler": "mine", "overrides": overrides}
+    assert remote.job_type(label) == expected
+    assert remote.shown_name(label) == f"s/{expected}/0"
+
+
+def test_job_types_are_as_short_as_wandb_takes_them_and_stay_apart() -> None:
+    """`wandb sync` fails where one has more than 64 characters (wandb/wandb#6402)."""
+    words = ",".join(f"model.option_{number}=1" for number in range(10))
+    a, b = (
+        remote.job_type({**LABEL, "overrides": f"{words},optimizer.lr={rate}"}) for rate in (1, 2)
+    )
+    assert a != b
+    assert max(len(a), len(b)) <= 64
+    assert a[:20] == b[:20] == "m, model.option_0=1,"
 
 
 def test_the_lowest_value_is_that_of_all_rows_and_nan_is_none(tmp_path) -> None:
@@ -265,7 +288,7 @@ def test_the_lowest_value_is_that_of_all_rows_and_nan_is_none(tmp_path) -> None:
             pass
 
     watched = Told(project="p", mode="offline", network=False, options={}, every=1)
-    watched.start(folder=tmp_path, settings={}, label=LABEL)
+    watched.start(folder=tmp_path, settings=SETTINGS, label=LABEL)
     for value in (math.nan, 0.4, 0.2):
         watched._tell({"step": 3, "hard_mape": value, "hard_lpips": None, "patches": 2})
     watched.finish(failed=False)
