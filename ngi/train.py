@@ -80,9 +80,11 @@ def train(config: DictConfig) -> dict[str, Any]:
             return _train(config, run, closing=stack)
 
 
-def _finish(tracker: learn.Tracker, failure: type[BaseException] | None, *_: object) -> None:
+def _finish(
+    tracker: learn.Tracker, _type: object, failure: BaseException | None, _traceback: object
+) -> None:
     """As the end of a `with` block."""
-    tracker.finish(failed=failure is not None)
+    tracker.finish(failure)
 
 
 def _train(config: DictConfig, run: learn.Run, *, closing: ExitStack) -> dict[str, Any]:

@@ -14,7 +14,16 @@ from PIL import Image
 from ngi.evaluate import Comparison
 from ngi.files.extras import install_command
 from ngi.files.row_log import RowLog
-from ngi.learn.remote_tracker import Remote, group, job_type, kept_id, nested, shown_name
+from ngi.learn.interruption import Interrupted
+from ngi.learn.remote_tracker import (
+    Remote,
+    group,
+    job_type,
+    kept_id,
+    nested,
+    reason,
+    shown_name,
+)
 
 
 class LightningLogger(Remote):
@@ -47,8 +56,8 @@ class LightningLogger(Remote):
         for name, image in comparison.error_maps.items():
             self._picture(f"error_maps/{name.replace(' ', '_')}", image, step)
 
-    def _end(self, *, failed: bool) -> None:
-        self._logger.finalize("failed" if failed else "success")
+    def _end(self, failure: BaseException | None) -> None:
+        self._logger.finalize("success" if failure is None else "failed")
 
     @abstractmethod
     def _picture(self, name: str, image: Image.Image, step: int) -> None: ...
@@ -124,6 +133,14 @@ class MLflow(LightningLogger):
         self._logger.experiment.log_image(
             self._logger.run_id, np.asarray(image), key=name, step=step
         )
+
+    def _end(self, failure: BaseException | None) -> None:
+        told = reason(failure)  # hides that of an earlier start
+        self._logger.experiment.set_tag(self._logger.run_id, "failure", told)
+        if isinstance(failure, Interrupted):
+            self._logger.finalize("KILLED")
+        else:
+            super()._end(failure)
 
     def _keep(self) -> None:
         for name in ("result.json", "metrics.csv"):

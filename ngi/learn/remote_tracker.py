@@ -16,6 +16,7 @@ from ngi.files.durable import write_atomically
 from ngi.files.row_log import RowLog
 from ngi.files.run_folder import TRACKED
 from ngi.files.run_names import run_group, shortened
+from ngi.learn.interruption import Interrupted
 from ngi.learn.tracker import Row, Tracker
 
 _logger = logging.getLogger(__name__)
@@ -135,11 +136,11 @@ class Remote(Tracker):
         step, comparison = int(str(row["step"])), evaluation.comparison(SETS[0])
         self._call(lambda: self._show(comparison, step))
 
-    def finish(self, *, failed: bool) -> None:
+    def finish(self, failure: BaseException | None) -> None:
         if self._aside is None:
             return
-        last = [] if failed else [self._keep]
-        last.append(lambda: self._end(failed=failed))
+        last = [self._keep] if failure is None else []
+        last.append(lambda: self._end(failure))
         self._aside.end(*last, seconds=FINISH_SECONDS + LEEWAY_SECONDS)
         self._aside = None
 
@@ -180,7 +181,14 @@ class Remote(Tracker):
         """Files of the finished run."""
 
     @abstractmethod
-    def _end(self, *, failed: bool) -> None: ...
+    def _end(self, failure: BaseException | None) -> None: ...
+
+
+def reason(failure: BaseException | None) -> str:
+    """'interrupted by SIGTERM' or 'ValueError: …', 500 characters at most; empty for no failure."""
+    if isinstance(failure, Interrupted):
+        return f"interrupted by {failure.number.name}"
+    return "" if failure is None else f"{type(failure).__name__}: {failure}"[:500]
 
 
 def kept_id(folder: Path, tracker: str, make: Callable[[], str]) -> str:

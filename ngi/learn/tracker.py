@@ -25,8 +25,11 @@ class Tracker:
     def finished(self, *, folder: Path, settings: dict[str, Any], label: dict[str, Any]) -> None:
         """The run was finished before: called instead of all others but `finish`."""
 
-    def finish(self, *, failed: bool) -> None:
-        """Called whatever happens, so that the jobs of a sweep stay apart."""
+    def finish(self, failure: BaseException | None) -> None:
+        """Called whatever happens, so that the jobs of a sweep stay apart.
+
+        failure: what ended the run before its end, an `Interrupted` too
+        """
 
 
 class Local(Tracker):

@@ -9,6 +9,7 @@ from typing import Any
 from ngi.evaluate import SETS, Comparison
 from ngi.files.row_log import RowLog
 from ngi.files.run_folder import LAST
+from ngi.learn.interruption import Interrupted
 from ngi.learn.remote_tracker import (
     FINISH_SECONDS,
     Remote,
@@ -16,6 +17,7 @@ from ngi.learn.remote_tracker import (
     job_type,
     kept_id,
     nested,
+    reason,
     shown_name,
 )
 
@@ -31,9 +33,10 @@ class WeightsAndBiases(Remote):
     """Weights & Biases, offline unless `mode` says 'online'.
 
     Errors are shown against run time, losses against steps. The summary has every metric's last
-    value, and its lowest below 'best/'. Each evaluation brings a sheet of predictions, references
-    and error maps of the hard frames, and the error maps one by one. Runs are grouped by sweep, or
-    else by experiment or budget; their job type is what else they differ in beside scene and seed.
+    value, its lowest below 'best/', and as 'failure' why a run ended early. Each evaluation brings
+    a sheet of predictions, references and error maps of the hard frames, and the error maps one by
+    one. Runs are grouped by sweep, or else by experiment or budget; their job type is what else
+    they differ in beside scene and seed.
 
     An interrupted run goes on as the same one: its id is in tracker.json. Offline, each start has a
     folder of its own below wandb/ of the run's folder, which `wandb sync` joins.
@@ -132,5 +135,7 @@ class WeightsAndBiases(Remote):
                 artifact.add_file(str(path))
         self._run.log_artifact(artifact)
 
-    def _end(self, *, failed: bool) -> None:
-        self._run.finish(exit_code=int(failed))
+    def _end(self, failure: BaseException | None) -> None:
+        self._run.summary["failure"] = reason(failure)  # hides that of an earlier start
+        code = failure.code if isinstance(failure, Interrupted) else int(failure is not None)
+        self._run.finish(exit_code=code)

@@ -1,5 +1,6 @@
 """TensorBoard and MLflow hold what the run's own files hold, read back by their own readers."""
 
+import signal
 from pathlib import Path
 
 import numpy as np
@@ -7,6 +8,7 @@ import pandas as pd
 import pytest
 from omegaconf import DictConfig
 
+from ngi.learn import Interrupted, MLflow
 from ngi.train import train
 from tests.learn.forked import configuration
 from tests.learn.lightning_warnings import IGNORED, RESUMED
@@ -88,10 +90,11 @@ def test_mlflow_has_one_run_with_all_that_is_passed_on(mlflow: Path) -> None:
     client = MlflowClient(f"sqlite:///{mlflow.parent}/mlflow.db")
     experiment = client.get_experiment_by_name("neural-global-illumination")
     (run,) = client.search_runs([experiment.experiment_id])
-    assert run.info.status == "FINISHED"
+    assert (run.info.status, run.data.tags["failure"]) == ("FINISHED", "")
     assert run.data.params["sampler"] == "mcmc_loss_step"
     assert run.data.params["settings/model/hidden_features"] == "24"
-    assert (run.data.tags["group"], run.data.tags["job_type"]) == ("steps", "mcmc_loss_step")
+    assert run.data.tags["group"] == "steps"
+    assert run.data.tags["job_type"].startswith("mcmc_loss_step, budget.steps=40, ")
     steps, metrics = (pd.read_csv(mlflow / f"{name}.csv") for name in ("steps", "metrics"))
     for key, table, column in (
         ("train/loss", steps[steps["step"] % 4 == 0], "loss"),
@@ -108,6 +111,28 @@ def test_mlflow_has_one_run_with_all_that_is_passed_on(mlflow: Path) -> None:
     for step in metrics["step"]:
         assert any(p.startswith(f"images/comparison+step+{step}+") for p in pictures)
         assert any(p.startswith(f"images/error_maps~hard_0+step+{step}+") for p in pictures)
+
+
+@pytest.mark.parametrize(
+    ("failure", "status", "reason"),
+    [
+        (RuntimeError("power cut"), "FAILED", "RuntimeError: power cut"),
+        (Interrupted(signal.SIGTERM), "KILLED", "interrupted by SIGTERM"),
+    ],
+)
+def test_mlflow_is_told_why_a_run_ended(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, failure: BaseException, status, reason
+) -> None:
+    mlflow = pytest.importorskip("mlflow", reason="the extra mlflow is missing")
+    monkeypatch.chdir(tmp_path)
+    uri = f"sqlite:///{tmp_path}/mlflow.db"
+    label = dict.fromkeys(("scene", "method", "sampler", "budget", "overrides", "seed"), "none")
+    tracker = MLflow(uri=uri, experiment="e", options={}, every=1)
+    tracker.start(folder=tmp_path, settings={"budget": {"clock": "wall"}}, label=label)
+    tracker.finish(failure)
+    client = mlflow.MlflowClient(uri)
+    (run,) = client.search_runs([client.get_experiment_by_name("e").experiment_id])
+    assert (run.info.status, run.data.tags["failure"]) == (status, reason)
 
 
 def test_a_database_that_cannot_be_opened_stops_no_run(tmp_path: Path, caplog) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import re
+import signal
 import sys
 import threading
 import time
@@ -13,7 +14,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from ngi.learn import MLflow, TensorBoard, WeightsAndBiases, lightning_trackers
+from ngi.learn import Interrupted, MLflow, TensorBoard, WeightsAndBiases, lightning_trackers
 from ngi.learn import remote_tracker as remote
 
 LABEL = {
@@ -45,6 +46,7 @@ class FakeWandb:
         self.Artifact = FakeArtifact
         self.log_artifact = lambda _: None
         self.step = 0
+        self.summary: dict[str, str] = {}
 
     def init(self, **_):
         self._called("init")
@@ -85,12 +87,29 @@ def test_rows_arrive_in_order_without_what_is_empty(watch, caplog) -> None:
     wandb, watched = watch()
     for step in range(100):
         watched.step({"step": step, "loss": None if step % 2 else 0.5})
-    watched.finish(failed=True)
-    watched.finish(failed=True)  # whatever happens
+    watched.finish(RuntimeError("power cut"))
+    watched.finish(RuntimeError("power cut"))  # whatever happens
     assert [row["step"] for row in wandb.rows] == list(range(100))
     assert [("train/loss" in row) for row in wandb.rows[:2]] == [True, False]
     assert wandb.calls[-1] == "finish 1"
     assert not caplog.records
+
+
+@pytest.mark.parametrize(
+    ("failure", "code", "reason"),
+    [
+        (None, 0, ""),
+        (ValueError("x" * 1000), 1, f"ValueError: {'x' * 488}"),
+        (KeyboardInterrupt(), 1, "KeyboardInterrupt: "),
+        (Interrupted(signal.SIGTERM), 143, "interrupted by SIGTERM"),
+    ],
+)
+def test_it_is_told_why_a_run_ended(watch, failure, code: int, reason: str) -> None:
+    wandb, watched = watch()
+    watched.finish(failure)
+    assert wandb.calls[-1] == f"finish {code}"
+    assert wandb.summary == {"failure": reason}
+    assert len(reason) <= 500
 
 
 def test_a_row_is_logged_as_it_was(watch) -> None:
@@ -100,7 +119,7 @@ def test_a_row_is_logged_as_it_was(watch) -> None:
     watched.step(row)
     row["step"] = 2
     gate.set()
-    watched.finish(failed=False)
+    watched.finish(None)
     assert wandb.rows == [{"step": 1, "train/loss": 0.5}]
 
 
@@ -114,7 +133,7 @@ def test_what_fails_is_said_once(watch, caplog, tmp_path: Path, where, error) ->
     wandb, watched = watch(trouble)
     for step in range(5):
         watched.step({"step": step})
-    watched.finish(failed=False)
+    watched.finish(None)
     (record,) = caplog.records
     assert record.levelno == logging.WARNING
     assert f"Weights & Biases failed ({type(error).__name__}: {error})" in record.message
@@ -133,7 +152,7 @@ def test_what_hangs_holds_nothing_up(watch, caplog, monkeypatch) -> None:
     for step in range(2000):
         watched.step({"step": step})
     logged = time.monotonic()
-    watched.finish(failed=False)
+    watched.finish(None)
     ended = time.monotonic()
     gate.set()
     assert logged - begun < 2
@@ -156,7 +175,7 @@ def test_the_last_evaluation_is_not_lost_where_it_is_made_again(watch) -> None:
     gate.set()
     for step in (5, 7, 8, 9):  # of a longer run the first is of before its learning rate fell
         watched.step({"step": step, "loss": 0.5})
-    watched.finish(failed=False)
+    watched.finish(None)
     assert [row["step"] for row in wandb.rows] == [None, 8, 9]
 
 
@@ -166,7 +185,7 @@ def test_the_end_is_told_where_too_many_calls_wait(watch, caplog, monkeypatch) -
     wandb, watched = watch(lambda what: time.sleep(0.01) if what == "log" else None)
     for step in range(200):
         watched.step({"step": step})
-    watched.finish(failed=False)
+    watched.finish(None)
     assert wandb.calls[-1] == "finish 0"
     assert "has lost" in caplog.text
 
@@ -178,7 +197,7 @@ def test_rows_go_on_where_the_network_comes_back(watch, caplog) -> None:
         watched.step({"step": step})
     assert wandb.rows == []
     gate.set()
-    watched.finish(failed=False)
+    watched.finish(None)
     assert len(wandb.rows) == 50
     assert not caplog.records
 
@@ -188,7 +207,7 @@ def test_without_wandb_the_run_does_not_start(monkeypatch, tmp_path) -> None:
     watched = wandb_tracker()
     with pytest.raises(RuntimeError, match=r"tracker=wandb: .* choose tracker=local"):
         watched.start(folder=tmp_path, settings=SETTINGS, label=LABEL)
-    watched.finish(failed=True)
+    watched.finish(RuntimeError("power cut"))
 
 
 def test_one_of_several_steps_is_passed_on(monkeypatch, tmp_path) -> None:
@@ -198,7 +217,7 @@ def test_one_of_several_steps_is_passed_on(monkeypatch, tmp_path) -> None:
     watched.start(folder=tmp_path, settings=SETTINGS, label=LABEL)
     for step in range(1, 10):
         watched.step({"step": step, "loss": 0.5})
-    watched.finish(failed=False)
+    watched.finish(None)
     assert [row["step"] for row in wandb.rows] == [3, 6, 9]
 
 
@@ -221,7 +240,7 @@ def test_what_to_install_is_said(monkeypatch, tmp_path, watched) -> None:
     message = rf"tracker={name}: {name} is not installed; `pip install .* -e .*\[{name}\].`"
     with pytest.raises(RuntimeError, match=message):
         watched.start(folder=tmp_path, settings=SETTINGS, label=LABEL)
-    watched.finish(failed=True)
+    watched.finish(RuntimeError("power cut"))
 
 
 def test_an_id_is_made_once_and_stays(tmp_path) -> None:
@@ -281,7 +300,7 @@ def test_the_lowest_value_is_that_of_all_rows_and_nan_is_none(tmp_path) -> None:
         def _log(self, row) -> None:
             told.append(row)
 
-        def _end(self, *, failed) -> None:
+        def _end(self, failure) -> None:
             pass
 
         def _keep(self) -> None:
@@ -291,6 +310,6 @@ def test_the_lowest_value_is_that_of_all_rows_and_nan_is_none(tmp_path) -> None:
     watched.start(folder=tmp_path, settings=SETTINGS, label=LABEL)
     for value in (math.nan, 0.4, 0.2):
         watched._tell({"step": 3, "hard_mape": value, "hard_lpips": None, "patches": 2})
-    watched.finish(failed=False)
+    watched.finish(None)
     assert [row["best/hard_mape"] for row in told] == [0.3, 0.3, 0.2]
     assert told[1] == {"step": 3, "hard/mape": 0.4, "run/patches": 2, "best/hard_mape": 0.3}

@@ -64,12 +64,15 @@ def test_it_is_one_run_across_the_interruption(folder: Path, parts: list[list[Re
     assert [run["run_id"] for run in told] == [kept] * 2
     assert all(run["resume"] for run in told)
     assert [next(of_kind(part, "exit")).get("exit_code", 0) for part in parts] == [1, 0]
+    told = [summary(part)["failure"] for part in parts]
+    assert told == ["RuntimeError: power cut", ""], "the second hides the first"
 
 
 def test_it_has_its_place(parts: list[list[Record]]) -> None:
     told = next(of_kind(parts[0], "run"))
-    assert (told["run_group"], told["job_type"]) == ("steps", "mcmc_loss_step")
-    assert told["display_name"] == "sphere-caustic/mcmc_loss_step/3"
+    assert told["run_group"] == "steps"
+    assert told["job_type"].startswith("mcmc_loss_step, budget.steps=40, ")
+    assert told["display_name"] == f"sphere-caustic/{told['job_type']}/3"
     assert {"scene=sphere-caustic", "seed=3"} <= {*told["tags"]}
 
 
