@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from ngi.evaluate import Comparison
+from ngi.evaluate import SETS, Comparison
 from ngi.files.extras import install_command
 from ngi.files.row_log import RowLog
 from ngi.learn.interruption import Interrupted
@@ -94,8 +94,14 @@ class TensorBoard(LightningLogger):
         self._logger.log_hyperparams(self._configuration, lowest)
 
 
+STEP, EVALUATION = "train/loss", f"{SETS[0]}/mape"
+"""What every row of either kind has."""
+
+
 class MLflow(LightningLogger):
     """MLflow: one run there, in one experiment, across interruptions; its id is in tracker.json.
+
+    What is done again after an interruption is there already, and is not told twice.
 
     uri: of the tracking server or its database
     experiment: as MLflow calls what runs are listed by
@@ -110,6 +116,7 @@ class MLflow(LightningLogger):
         super().__init__(options=options, every=every)
         self._uri = uri
         self._experiment = experiment
+        self._told: dict[str, int] = {}
 
     def _begin(self, folder: Path, settings: dict[str, Any], label: dict[str, Any]) -> None:
         from lightning.pytorch.loggers import MLFlowLogger
@@ -127,7 +134,19 @@ class MLflow(LightningLogger):
 
         run_id = kept_id(folder, "mlflow", begun)
         self._logger = logger(run_id=run_id)
-        self._logger.experiment.update_run(run_id, status="RUNNING")
+        client = self._logger.experiment
+        client.update_run(run_id, status="RUNNING")
+        for key in (STEP, EVALUATION):
+            points = client.get_metric_history(run_id, key)
+            self._told[key] = max((point.step for point in points), default=-1)
+
+    def _log(self, row: dict[str, float]) -> None:
+        if row["step"] > self._told[STEP if STEP in row else EVALUATION]:
+            super()._log(row)
+
+    def _show(self, comparison: Comparison, step: int) -> None:
+        if step > self._told[EVALUATION]:
+            super()._show(comparison, step)
 
     def _picture(self, name: str, image: Image.Image, step: int) -> None:
         self._logger.experiment.log_image(
