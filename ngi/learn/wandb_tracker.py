@@ -1,7 +1,7 @@
 """Weights & Biases, as its users expect a run there to look."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from secrets import token_hex
 from typing import Any
@@ -24,6 +24,9 @@ from ngi.learn.remote_tracker import (
 SWEEP = "WANDB_SWEEP_ID"
 """Set by W&B's agents, which also choose the project and the run's id."""
 
+LONGEST_TAG = 64
+"""Characters: `wandb.init` refuses longer ones."""
+
 RESULT = ("result.json", "settings.json", "commits.json", "metrics.csv", "steps.csv")
 NETWORK = (LAST, "result.json", "settings.json", "scene.json")
 """Files of the artifacts; those of the second are a folder that `ngi view` opens."""
@@ -41,6 +44,7 @@ class WeightsAndBiases(Remote):
     An interrupted run goes on as the same one: its id is in tracker.json. Offline, each start has a
     folder of its own below wandb/ of the run's folder, which `wandb sync` joins.
 
+    tags: beside those of scene, sampler and seed, and those of the variable WANDB_TAGS
     network: whether the network of the finished run is an artifact too, beside its result
     options: what was chosen of each group of conf/
     """
@@ -48,13 +52,21 @@ class WeightsAndBiases(Remote):
     name = "Weights & Biases"
 
     def __init__(
-        self, *, project: str, mode: str, network: bool, options: Mapping[str, Any], every: int
+        self,
+        *,
+        project: str,
+        mode: str,
+        tags: Sequence[str],
+        network: bool,
+        options: Mapping[str, Any],
+        every: int,
     ) -> None:
         super().__init__(every=every)
         if mode not in ("offline", "online"):
             raise ValueError(f"tracker.mode: '{mode}'; expected 'offline' or 'online'")
         self._project = project
         self._mode = mode
+        self._tags = tags
         self._network = network
         self._options = options
         self._run: Any = None
@@ -90,7 +102,7 @@ class WeightsAndBiases(Remote):
             group=group(label, settings, self._options),
             job_type=job_type(label),
             name=shown_name(label),
-            tags=[f"{key}={label[key]}" for key in ("scene", "sampler", "seed")],
+            tags=self._all_tags(label),
             reinit="finish_previous",
             settings=wandb.Settings(quiet=True, finish_timeout=FINISH_SECONDS),
         )
@@ -101,6 +113,12 @@ class WeightsAndBiases(Remote):
             self._run.define_metric(f"{section}/*", step_metric="step")
         for section in (*SETS, "best"):
             self._run.define_metric(f"{section}/*", step_metric="run_seconds")
+
+    def _all_tags(self, label: dict[str, Any]) -> list[str]:
+        """Each as short as W&B takes it; those given here would win over the environment's."""
+        ours = [f"{key}={label[key]}" for key in ("scene", "sampler", "seed")]
+        told = [*ours, *map(str, self._tags), *os.environ.get("WANDB_TAGS", "").split(",")]
+        return [tag[:LONGEST_TAG] for tag in told if tag]
 
     def _log(self, row: dict[str, float]) -> None:
         self._send(row, int(row["step"]))

@@ -38,3 +38,22 @@ def test_runs_are_grouped_by_experiment_or_budget_and_by_clock() -> None:
     assert run_group("demo", "small", "wall") == "demo"
     assert run_group(None, "small", "wall") == "small"
     assert run_group(None, "small", "model") == "small-model-clock"
+
+
+def test_what_a_tracker_is_told_names_no_run() -> None:
+    """Else runs would differ by it where they are compared."""
+    config = composed(
+        *("tracker=wandb", "tracker.project=p", "tracker.mode=online", "tracker.tags=[a,b]"),
+        *("tracker.network=true", "tracker.every=2"),
+    )
+    assert config.label.overrides == "default"
+    assert config.tracker.tags == ["a", "b"]
+
+
+def test_the_environment_chooses_project_and_mode_at_wandb(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("WANDB_PROJECT", "lab")
+    monkeypatch.setenv("WANDB_MODE", "online")
+    told = composed("tracker=wandb").tracker
+    assert (told.project, told.mode) == ("lab", "online")
+    given = composed("tracker=wandb", "tracker.project=mine").tracker
+    assert (given.project, given.mode) == ("mine", "online")

@@ -9,6 +9,7 @@ import signal
 import sys
 import threading
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -47,8 +48,10 @@ class FakeWandb:
         self.log_artifact = lambda _: None
         self.step = 0
         self.summary: dict[str, str] = {}
+        self.tags: list[str] = []
 
-    def init(self, **_):
+    def init(self, *, tags, **_):
+        self.tags = tags
         self._called("init")
         return self
 
@@ -65,8 +68,10 @@ class FakeWandb:
         self._trouble(what.split()[0])
 
 
-def wandb_tracker(*, mode: str = "offline", every: int = 1) -> WeightsAndBiases:
-    return WeightsAndBiases(project="p", mode=mode, network=False, options={}, every=every)
+def wandb_tracker(
+    *, mode: str = "offline", every: int = 1, tags: Sequence[str] = (), cls=WeightsAndBiases
+) -> WeightsAndBiases:
+    return cls(project="p", mode=mode, tags=tags, network=False, options={}, every=every)
 
 
 @pytest.fixture
@@ -210,6 +215,17 @@ def test_without_wandb_the_run_does_not_start(monkeypatch, tmp_path) -> None:
     watched.finish(RuntimeError("power cut"))
 
 
+def test_tags_of_configuration_and_environment_come_beside_ours(monkeypatch, tmp_path) -> None:
+    wandb = FakeWandb()
+    monkeypatch.setitem(sys.modules, "wandb", wandb)
+    monkeypatch.setenv("WANDB_TAGS", "cluster,night")
+    watched = wandb_tracker(tags=["x" * 65, 7])
+    watched.start(folder=tmp_path, settings=SETTINGS, label={**LABEL, "scene": "y" * 65})
+    watched.finish(None)
+    ours = ["scene=" + "y" * 58, "sampler=m", "seed=0"]
+    assert wandb.tags == [*ours, "x" * 64, "7", "cluster", "night"]
+
+
 def test_one_of_several_steps_is_passed_on(monkeypatch, tmp_path) -> None:
     wandb = FakeWandb()
     monkeypatch.setitem(sys.modules, "wandb", wandb)
@@ -306,7 +322,7 @@ def test_the_lowest_value_is_that_of_all_rows_and_nan_is_none(tmp_path) -> None:
         def _keep(self) -> None:
             pass
 
-    watched = Told(project="p", mode="offline", network=False, options={}, every=1)
+    watched = wandb_tracker(cls=Told)
     watched.start(folder=tmp_path, settings=SETTINGS, label=LABEL)
     for value in (math.nan, 0.4, 0.2):
         watched._tell({"step": 3, "hard_mape": value, "hard_lpips": None, "patches": 2})
