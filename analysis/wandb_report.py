@@ -1,4 +1,4 @@
-"""A report's tables at Weights & Biases, beside the runs that it compares."""
+"""A report's tables at Weights & Biases, in a run of their own."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def send(files: Sequence[Path], *, name: str, project: str) -> Path:
     """Logs results.csv as a table and the page and tables as an artifact 'report-NAME'.
 
     files: of a report, all in one folder; pictures are left out, the page holds them
-    name: of what is reported, which runs there are grouped by
+    name: of what is reported
 
     Offline, unless the variable WANDB_MODE says online; returns the folder that W&B writes into.
     Raises RuntimeError where wandb is not installed.
@@ -32,7 +32,6 @@ def send(files: Sequence[Path], *, name: str, project: str) -> Path:
         mode=None if "WANDB_MODE" in os.environ else "offline",
         dir=results.parent,
         job_type="report",
-        group=name,
         name=f"report of {name}",
         settings=wandb.Settings(quiet=True),
     ) as run:

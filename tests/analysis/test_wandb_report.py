@@ -21,13 +21,15 @@ def runs(make_run, tmp_path, monkeypatch) -> Path:
 
 
 @pytest.mark.usefixtures("undrawn")
-def test_tables_are_an_artifact_beside_the_runs(runs: Path, capsys) -> None:
+def test_tables_are_an_artifact_of_a_run_of_their_own(runs: Path, capsys) -> None:
     assert main([str(runs), "--wandb", "caustics"]) == 0
     (file,) = (runs / "report" / "wandb").glob("offline-run-*/*.wandb")
     assert str(file.parent) in capsys.readouterr().out
     found = records(file)
     run = next(of_kind(found, "run"))
-    assert (run["project"], run["run_group"], run["job_type"]) == ("caustics", "seed=0,1", "report")
+    assert (run["project"], run["job_type"]) == ("caustics", "report")
+    assert run["display_name"] == "report of seed=0,1"
+    assert "run_group" not in run, "runs are grouped by sweep, whatever their folder is called"
     (artifact,) = [a for a in of_kind(found, "artifact") if a["type"] == "report"]
     assert artifact["name"] == "report-seed-0-1", "W&B takes no other signs"
     kept = {entry["path"]: int(entry.get("size", 0)) for entry in artifact["manifest"]["contents"]}
