@@ -1,5 +1,6 @@
 import json
 from pathlib import Path
+from statistics import mean
 
 import pytest
 
@@ -28,3 +29,34 @@ def test_weights_and_biases_runs_offline_and_stay_apart(tmp_path: Path) -> None:
     assert len(runs) == 2
     assert len({r.parents[1] for r in runs}) == 2
     assert all(any(r.glob("*.wandb")) for r in runs)
+
+
+SWEEPER = """
+from pathlib import Path
+from hydra._internal.core_plugins.basic_sweeper import BasicSweeper
+
+class Optimising(BasicSweeper):
+    def sweep(self, arguments):
+        (jobs,) = super().sweep(arguments)
+        Path("values").write_text("\\n".join(str(float(job.return_value)) for job in jobs))
+"""
+"""As those of Optuna, Ax and Nevergrad, it makes a number of what a job returns."""
+
+
+def test_a_sweeper_that_optimises_is_given_the_error_on_hard_frames(tmp_path: Path) -> None:
+    (tmp_path / "hydra_plugins").mkdir()
+    (tmp_path / "hydra_plugins" / "optimising.py").write_text(SWEEPER)
+    words = ("optimizer.lr=1e-3,1e-2", "run.folder='outputs/${optimizer.lr}'")
+    sweeper = "hydra.sweeper._target_=hydra_plugins.optimising.Optimising"
+    for _ in ("trained", "finished already"):
+        status, output = run_cold(tmp_path, *words, sweeper, options=("-m",))  # it finds plugins
+        assert status == 0, output
+        values = [float(value) for value in (tmp_path / "values").read_text().split()]
+        (tmp_path / "values").unlink()
+        expected = []
+        for rate in ("0.001", "0.01"):
+            frames = json.loads((tmp_path / "outputs" / rate / "result.json").read_text())["frames"]
+            expected.append(mean(each["mape"] for each in frames if each["set"] == "hard"))
+        assert values == pytest.approx(expected)
+    assert "finished already" in output
+    assert values[0] != values[1]
