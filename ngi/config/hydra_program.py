@@ -115,6 +115,9 @@ WITH_LESS_MEMORY = (
     "last checkpoint"
 )
 
+KILLED = ("UncompletedJobError", "TerminatedWorkerError")
+"""What Submitit and joblib raise where a job's process has ended without an answer."""
+
 FULL_ERROR = "HYDRA_FULL_ERROR"
 """The environment variable that makes Hydra raise errors, which it would print otherwise."""
 NOT_FOR_USERS = ("hydra", "label")
@@ -124,9 +127,10 @@ NOT_FOR_USERS = ("hydra", "label")
 def run_program(program: Callable[[], None], *, folder_option: str = "run.folder") -> None:
     """Calls a function that `hydra.main` has made.
 
-    Where its configuration cannot be composed or a job of a sweep has failed, the process ends with
-    status 1 and one message, after Ctrl-C with status 130. Who sets HYDRA_FULL_ERROR=1 gets Hydra's
-    own exceptions with their tracebacks; that of a job's error is in its log file (`fail`).
+    Where its configuration cannot be composed, or a job of a sweep has failed or was killed by the
+    system, the process ends with status 1 and one message, after Ctrl-C with status 130. Who sets
+    HYDRA_FULL_ERROR=1 gets Hydra's own exceptions with their tracebacks; that of a job's error is
+    in its log file (`fail`).
 
     folder_option: what chooses the folder that Hydra writes to
     """
@@ -148,6 +152,10 @@ def run_program(program: Callable[[], None], *, folder_option: str = "run.folder
             raise
         advice = f"choose another folder with {folder_option}=…, or see to its permissions"
         sys.exit(f"{cause}; {advice}")
+    except RuntimeError as error:
+        if type(error).__name__ not in KILLED:
+            raise
+        sys.exit(" ".join(str(error).splitlines()[:2]).strip())  # the job's log may follow
     except KeyboardInterrupt:
         sys.exit(130)
 

@@ -1,4 +1,4 @@
-"""A sweep from its start to its end: a table of its runs, a line after each, and what failed.
+"""A sweep from its start to its end: a table of its runs, a line after each, what is amiss.
 
 Hydra calls this (`hydra.callbacks`) in the process that starts the sweep. Processes that its
 launcher starts have a copy.
@@ -71,7 +71,8 @@ class Sweep(Callback):
     def on_job_end(self, config: DictConfig, job_return: JobReturn, **_: Any) -> None:
         if self._notes is None or not self._notes.is_dir():
             return  # a run alone
-        note = {"folder": str(config.run.folder), "failure": _failure(job_return)}
+        folder = Path(config.run.folder).resolve()
+        note = {"folder": str(folder), "failure": _failure(job_return)}
         # another job of the sweep may read it meanwhile
         write_atomically(self._notes / f"{config.hydra.job.num}.json", json.dumps(note).encode())
         if self._runs:
@@ -87,13 +88,24 @@ class Sweep(Callback):
         return {int(file.stem): json.loads(file.read_text()) for file in files}
 
     def _end(self) -> None:
-        """Says at the end of the program which runs failed, and why."""
+        """Says at the end of the program which runs failed, and why, and which have not ended."""
         assert self._notes is not None
-        failures = [note for note in self._ended().values() if note["failure"] is not None]
+        ended = [*self._ended().values()]
         shutil.rmtree(self._notes, ignore_errors=True)
+        failures = [note for note in ended if note["failure"] is not None]
         if failures:
             lines = [f"  {shown(Path(note['folder']))}: {note['failure']}" for note in failures]
             text = "\n".join([f"{counted(failures)} of this sweep failed:", *lines])
+            print(text, file=sys.stderr, flush=True)
+        over = {Path(note["folder"]) for note in ended}
+        left = [run for run in self._runs if run.folder not in over and run.state != "finished"]
+        if left:
+            has = "has" if len(left) == 1 else "have"
+            folders = ", ".join(shown(run.folder) for run in left)
+            text = (
+                f"{counted(left)} of this sweep {has} not ended (killed, not started, or still "
+                f"waiting or running on a cluster): {folders}; the same command goes on"
+            )
             print(text, file=sys.stderr, flush=True)
 
 

@@ -22,6 +22,49 @@ def test_one_failing_job_does_not_lose_the_others(tmp_path: Path, launcher: str)
     assert [r["config"]["optimizer"]["lr"] for r in results] == [0.001]
 
 
+DEADLY = """
+import os
+import signal
+
+def killed(*_, **__):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+def terminated(*_, **__):
+    os.kill(os.getpid(), signal.SIGTERM)
+"""
+
+
+@pytest.mark.parametrize(
+    ("launcher", "end", "status", "said", "finished"),
+    [
+        ("basic", "terminated", 143, "ended by SIGTERM", "0"),
+        ("submitit_local", "killed", 1, "_result.pkl has not produced any output (state: ", "0"),
+        # joblib ends the processes of other runs too
+        ("joblib", "killed", 1, "excessive memory usage", "0,1"),
+    ],
+)
+def test_runs_that_were_killed_or_not_started_are_named_at_the_end(
+    tmp_path: Path, launcher: str, end: str, status: int, said: str, finished: str
+) -> None:
+    """finished: seeds of the runs that were made before this sweep"""
+    if launcher != "basic":
+        plugin = launcher.partition("_")[0]
+        pytest.importorskip(f"hydra_plugins.hydra_{plugin}_launcher", reason="an extra is missing")
+    (tmp_path / "deadly.py").write_text(DEADLY)
+    place = "run.folder='outputs/${optimizer._target_}-${seed}'"
+    before, output = run(tmp_path, f"seed={finished}", place, options=("--multirun",))
+    assert before == 0, output
+    start = run_cold if launcher == "joblib" else run
+    words = (f"optimizer._target_=torch.optim.Adam,deadly.{end}", "seed=0,1", place)
+    found, output = start(tmp_path, f"hydra/launcher={launcher}", *words, options=("--multirun",))
+    assert found == status, output
+    assert said in output
+    assert "Traceback" not in output
+    killed = f"outputs/deadly.{end}-0, outputs/deadly.{end}-1"
+    assert "2 runs of this sweep have not ended (killed, not started, or" in output
+    assert f" on a cluster): {killed}; the same command goes on\n" in output
+
+
 def test_weights_and_biases_runs_offline_and_stay_apart(tmp_path: Path) -> None:
     status, output = run(tmp_path, "tracker=wandb", "seed=0,1", options=("--multirun",))
     assert status == 0, output
