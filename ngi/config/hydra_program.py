@@ -21,9 +21,12 @@ from typing import Any, NoReturn
 
 from hydra._internal.utils import get_args_parser
 from hydra.core.hydra_config import HydraConfig
+from hydra.core.override_parser.overrides_parser import OverridesParser
+from hydra.core.override_parser.types import Glob
 from hydra.errors import (
     CompactHydraException,
     ConfigCompositionException,
+    HydraException,
     InstantiationException,
     MissingConfigException,
     OverrideParseException,
@@ -34,7 +37,7 @@ from omegaconf.errors import OmegaConfBaseException
 
 from ngi.config.unread_output import readers_may_leave
 from ngi.files.extras import install_command
-from ngi.files.resources import config_groups, scene_places
+from ngi.files.resources import config_groups, root, scene_places
 
 MULTIRUN = ("-m", "--multirun")
 SHOWING = ("-c", "--cfg", "-i", "--info", "-h", "--help", "--hydra-help")
@@ -60,14 +63,27 @@ def completed(words: Sequence[str]) -> list[str]:
         if "=" in word and not word.startswith("-")
     }
     budget = named.get("budget", "machine")
-    swept = re.sub(r"^choice\((.*)\)$", r"\1", named.get("method", "ours").strip())
-    methods = re.split(r"[\s,]+", swept.strip())
+    methods = _methods(named.get("method", "ours"))
     with_ours = any(re.fullmatch(r"ours(_\w+)?(/\w+)?", method) for method in methods)
     if budget not in BEST_METHOD or not with_ours or any(group in named for group in CHOOSING):
         return list(words)
     ours = {"budget": budget, "method": BEST_METHOD[budget]}
     added = (f"{group}={choice}" for group, choice in ours.items() if group not in named)
     return with_overrides(words, *added)
+
+
+def _methods(word: str) -> list[str]:
+    """Those that method=WORD means; none where Hydra will refuse it."""
+    try:
+        override = OverridesParser.create().parse_override(f"method={word}")
+    except HydraException:
+        return []
+    value: Any = override.value()
+    if isinstance(value, Glob):
+        return value.filter([file.stem for file in (root() / "conf" / "method").glob("*.yaml")])
+    if override.is_discrete_sweep():
+        return [name.strip("'\"") for name in override.sweep_string_iterator()]
+    return [str(value)]
 
 
 def in_order(words: Sequence[str]) -> list[str]:
