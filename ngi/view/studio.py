@@ -91,6 +91,15 @@ class Studio:
             self._asked.append((errand, failed))
             self._changed.notify()
 
+    def view(self, place: Place) -> SceneView:
+        """What is or can be computed there; in the thread that calls `work`, see `ask`."""
+        if place not in self._views:
+            self._views[place] = SceneView(place, self._renderer, self._predict)
+        self._views.move_to_end(place)
+        view = self._views[place]
+        self._forget()
+        return view
+
     def network_changed(self) -> None:
         """Every picture is made again."""
         with self._changed:
@@ -138,7 +147,7 @@ class Studio:
 
     def _make(self, turn: _Turn, *, full: bool) -> None:
         wish = turn.job.wish
-        view = self._view(wish.place)
+        view = self.view(wish.place)
         if turn.job.more_paths:
             view.trace()
         pixels = wish.screen.pixels(view)
@@ -168,14 +177,6 @@ class Studio:
                 return turn
             better = better or turn
         return better
-
-    def _view(self, place: Place) -> SceneView:
-        if place not in self._views:
-            self._views[place] = SceneView(place, self._renderer, self._predict)
-        self._views.move_to_end(place)
-        view = self._views[place]
-        self._forget()
-        return view
 
     def _forget(self) -> None:
         """Views too many that no browser looks at; last those with more paths than a preview."""

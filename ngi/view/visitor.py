@@ -3,7 +3,7 @@
 import io
 import shlex
 from collections import deque
-from functools import partial
+from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Lock
@@ -13,12 +13,13 @@ from typing import Any
 import numpy as np
 import viser
 from PIL import Image
+from PIL.PngImagePlugin import PngInfo
 
 from ngi.evaluate import image_metrics
 from ngi.evaluate.pictures import WHITE, side_by_side
 from ngi.render.exr import write_exr
 from ngi.view.panel import Panel
-from ngi.view.scene_view import PASS_SAMPLES, Place
+from ngi.view.scene_view import PASS_SAMPLES, Place, SceneView
 from ngi.view.screen import Pixels
 from ngi.view.session import Wish
 from ngi.view.studio import Shown, Studio
@@ -119,7 +120,7 @@ class Visitor:
             lines.append(f"{rate:.1f} pictures per second")
         if shown.wish.screen.traces_paths:
             lines.append(f"{view.samples} samples per pixel")
-            lines.append(self._metrics(shown))
+            lines.append(self._metrics(shown) if shown.full else "metrics once nothing moves")
         return lines
 
     def _pictures_per_second(self) -> float | None:
@@ -152,18 +153,8 @@ class Visitor:
             )
             upload = gui.add_upload_button("load v", mime_type="application/json")
 
-        @png.on_click
-        def _(_: object) -> None:
-            if self._last is not None:
-                buffer = io.BytesIO()
-                Image.fromarray(self._last.pixels).save(buffer, "PNG")
-                client.send_file_download("picture.png", buffer.getvalue(), save_immediately=True)
-
-        @exr.on_click
-        def _(_: object) -> None:
-            if self._last is not None:
-                # of a buffer the network's picture may not be there yet
-                self._studio.ask(partial(self._send_exr, self._last), self.failed)
+        png.on_click(lambda _: self._save("picture.png", self._png))
+        exr.on_click(lambda _: self._save("picture.exr", _exr))
 
         @save.on_click
         def _(_: object) -> None:
@@ -176,41 +167,59 @@ class Visitor:
             except ValueError as error:
                 client.add_notification("This file cannot be loaded", str(error), color="red")
 
-    def _send_exr(self, shown: Shown) -> None:
-        self._client.send_file_download("picture.exr", _exr(shown), save_immediately=True)
+    def _save(self, name: str, content: Callable[[SceneView, Wish], bytes]) -> None:
+        """Sends the whole picture of the present wish as a file, whatever preview is shown."""
+        wish, send = self.wish, self._client.send_file_download
+
+        def errand() -> None:
+            made = content(self._studio.view(wish.place), wish)
+            send(name, made, save_immediately=True)
+
+        self._studio.ask(errand, self.failed)
+
+    def _png(self, view: SceneView, wish: Wish) -> bytes:
+        """Carries the command that makes it as text, "command", where there is one."""
+        picture, text, file = Image.fromarray(wish.screen.pixels(view)), PngInfo(), io.BytesIO()
+        if (command := self._command_for(wish, view.samples)) is not None:
+            text.add_text("command", command)
+        picture.save(file, "PNG", pnginfo=text)
+        return file.getvalue()
 
     def _command_line(self) -> str:
-        screen = self._panel.screen
+        wish, last = self.wish, self._last
+        seen = last is not None and last.view.place == wish.place
+        samples = last.view.samples if last is not None and seen else 0
+        return self._command_for(wish, samples) or "no command makes pictures of buffers"
+
+    def _command_for(self, wish: Wish, samples: int) -> str | None:
+        """What makes a picture without the page; None of a buffer.
+
+        samples: per pixel of its path-traced part, which begins with a single pass
+        """
+        place, screen = wish.place, wish.screen
         if "buffers" in screen.needs:
-            return "no command makes pictures of buffers"
-        v = ",".join(f"{number:.6g}" for number in self._panel.v)
-        words = [f"run={self._subject.folder}", f"v=[{v}]", f"resolution={self._panel.resolution}"]
+            return None
+        v = ",".join(f"{number:.6g}" for number in place.v)
+        words = [f"run={self._subject.folder}", f"v=[{v}]", f"resolution={place.resolution}"]
         if self._subject.scene is not None:
             words.append(f"scene={self._subject.scene}")
         if self._subject.supersampled_edges:
             words.append("supersampled_edges=true")
         if screen.traces_paths:
-            words.append(f"reference={self._samples}")
+            words.append(f"reference={samples or PASS_SAMPLES}")
         if screen.exposure:
             words.append(f"exposure={screen.exposure:g}")
         if screen.curve != "sRGB":
             words.append(f"tone_mapping={screen.curve}")
         return shlex.join(["ngi", "render", *words, "out=picture.png"])
 
-    @property
-    def _samples(self) -> int:
-        """Per pixel of the path-traced picture, which begins with a single pass."""
-        if self._last is None or self._last.view.place != self._place:
-            return PASS_SAMPLES
-        return self._last.view.samples or PASS_SAMPLES
 
-
-def _exr(shown: Shown) -> bytes:
+def _exr(view: SceneView, wish: Wish) -> bytes:
     """Radiance of the first picture that is shown; the network's where that is a buffer."""
-    traced = shown.wish.screen.parts[0] == "path tracer"
+    traced = wish.screen.parts[0] == "path tracer"
     with TemporaryDirectory() as folder:
         path = Path(folder) / "picture.exr"
-        write_exr(path, shown.view.reference if traced else shown.view.prediction)
+        write_exr(path, view.reference if traced else view.prediction)
         return path.read_bytes()
 
 

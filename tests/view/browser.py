@@ -31,6 +31,7 @@ class Browser:
     def __init__(self, gui: viser.GuiApi) -> None:
         self.gui = gui
         self.shown: list[tuple[np.ndarray, str]] = []
+        self.files: dict[str, bytes] = {}
         self.camera = SimpleNamespace(
             position=np.zeros(3),
             look_at=np.ones(3),
@@ -54,6 +55,10 @@ class Browser:
 
     def flush(self) -> None:
         pass
+
+    def send_file_download(self, name: str, content: bytes, *, save_immediately: bool) -> None:
+        assert save_immediately
+        self.files[name] = content
 
     def says(self, position: Any, look_at: Any, *, at: float | None = None) -> None:
         """Where its camera is; at: when that was received, now where it is None."""

@@ -3,6 +3,7 @@
 import shlex
 from contextlib import closing
 from dataclasses import replace
+from io import BytesIO
 from threading import Thread, get_ident
 from types import SimpleNamespace
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
+from PIL import Image
 from skimage.feature import match_template
 
 viser = pytest.importorskip("viser", reason="needs pip install -e .[viewer]")
@@ -21,7 +23,7 @@ from ngi.view.picture import PictureOptions  # noqa: E402
 from ngi.view.scene_view import Place, SceneView  # noqa: E402
 from ngi.view.screen import Screen  # noqa: E402
 from ngi.view.session import Wish  # noqa: E402
-from ngi.view.studio import Shown  # noqa: E402
+from ngi.view.studio import Shown, Studio  # noqa: E402
 from ngi.view.visitor import Visitor  # noqa: E402
 from tests.view.browser import START, Browser, coloured, studio, subject, visitor  # noqa: E402
 
@@ -80,21 +82,65 @@ def test_the_radiance_of_a_buffers_picture_is_made_where_pictures_are(browser: B
         made_in.append(get_ident())
         return coloured(buffers, v, preview=preview)
 
-    files: list[str] = []
-    browser.send_file_download = lambda name, *_, **__: files.append(name)  # type: ignore[attr-defined]
     renderer = AnalyticRenderer(dimensions=7, patch_size=16)
-    about = studio()
+    about = Studio(renderer=renderer, predict=predict)
     made = Visitor(browser, subject(), about, resolution=64)  # type: ignore[arg-type]
-    view = SceneView(Place((0.5,) * 7, 64), renderer, predict)
-    screen = Screen("albedo")
+    made._panel._show.value = "albedo"
+    view, screen = about.view(made.wish.place), made.wish.screen
     made.show(Shown(screen.pixels(view), view, Wish(view.place, screen), full=True))
     asking = Thread(target=lambda: press(made, "radiance (EXR)"))
     asking.start()
     asking.join()
-    assert made_in == files == []
+    assert made_in == [*browser.files] == []
     assert about.work(wait=0)
     assert made_in == [get_ident()]
-    assert files == ["picture.exr"]
+    assert [*browser.files] == ["picture.exr"]
+
+
+@pytest.mark.parametrize(("show", "shown"), [("network", 0), ("network | path tracer", 1)])
+def test_what_is_saved_while_a_preview_is_shown_is_whole(
+    browser: Browser, monkeypatch: pytest.MonkeyPatch, show: str, shown: int
+) -> None:
+    written: list[torch.Tensor] = []
+    monkeypatch.setattr(
+        "ngi.view.visitor.write_exr",
+        lambda path, radiance: (written.append(radiance), path.write_bytes(b"EXR")),
+    )
+    about = studio()
+    made = Visitor(browser, subject(), about, resolution=64)  # type: ignore[arg-type]
+    made._panel._show.value = show
+    coarse = SceneView(Place(tuple(START), 16, rays=3), about._renderer, coloured)
+    made.show(Shown(made.wish.screen.pixels(coarse), coarse, made.wish, full=False))
+    for label in ("picture (PNG)", "radiance (EXR)"):
+        press(made, label)
+        assert about.work(wait=0)
+    whole = SceneView(Place(tuple(START), 64), about._renderer, coloured)
+    picture = Image.open(BytesIO(browser.files["picture.png"]))
+    np.testing.assert_array_equal(np.asarray(picture), Screen(show).pixels(whole))
+    torch.testing.assert_close(written, [whole.prediction])
+    words = shlex.split(picture.info["command"])
+    assert words[:3] == ["ngi", "render", "run=run"]
+    assert words[4:] == ["resolution=64", *shown * ["reference=8"], "out=picture.png"]
+    options = read_options(PictureOptions, "ngi render", words[2:])
+    assert options.v == pytest.approx(START)
+
+
+def test_a_saved_picture_of_a_buffer_names_no_command(browser: Browser) -> None:
+    about = studio()
+    made = Visitor(browser, subject(), about, resolution=64)  # type: ignore[arg-type]
+    made._panel._show.value = "albedo"
+    press(made, "picture (PNG)")
+    assert about.work(wait=0)
+    assert "command" not in Image.open(BytesIO(browser.files["picture.png"])).info
+
+
+@pytest.mark.parametrize("full", [False, True])
+def test_metrics_are_of_whole_pictures_alone(browser: Browser, full: bool) -> None:
+    made = visitor(browser)
+    made._panel._show.value = "error"
+    view = SceneView(made.wish.place, AnalyticRenderer(dimensions=7, patch_size=16), coloured)
+    made.show(Shown(made.wish.screen.pixels(view), view, made.wish, full=full))
+    assert ("MAPE" in made._panel._status.content) == full
 
 
 def press(made: Visitor, label: str) -> None:
