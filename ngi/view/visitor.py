@@ -1,5 +1,6 @@
 """One browser that looks at a page: its controls, its camera, its picture."""
 
+import html
 import io
 import shlex
 from collections import deque
@@ -8,7 +9,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Lock
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 import viser
@@ -32,6 +32,10 @@ RATE_OVER = 2.0
 """Seconds over which pictures per second are counted."""
 WIDEST = 8
 """Width / height of a window, or the other way round, from which on a picture does not fit."""
+COMMAND = """<div style="padding: 0 1em; font-size: 0.85em">
+<button onclick="navigator.clipboard.writeText(this.nextElementSibling.textContent)">copy</button>
+<code style="user-select: all; word-break: break-all">{}</code></div>"""
+"""A click selects all of it, where a browser gives its clipboard to no page by HTTP."""
 GREY = 24
 """Of what is beside the picture where the window has another shape."""
 
@@ -73,7 +77,7 @@ class Visitor:
         with self._sending:
             self._send(shown)
         self._moments.append(perf_counter())
-        self._command.value = self._command_line()
+        self._show_command()
         self._panel.say(self._status(shown, sending=perf_counter() - begin))
 
     def failed(self, error: Exception) -> None:
@@ -105,7 +109,7 @@ class Visitor:
 
     def _changed(self) -> None:
         self._studio.change(self._client.client_id, self.wish)
-        self._command.value = self._command_line()
+        self._show_command()
         if self._walk is not None:
             self._walk.follow()
 
@@ -147,7 +151,8 @@ class Visitor:
     def _add_files(self) -> None:
         gui, client = self._client.gui, self._client
         with gui.add_folder("Files", expand_by_default=False):
-            self._command: Any = gui.add_text("command", self._command_line(), disabled=True)
+            self._command = gui.add_html("")
+            self._show_command()
             png, exr, save = (
                 gui.add_button(name) for name in ("picture (PNG)", "radiance (EXR)", "save v")
             )
@@ -185,11 +190,18 @@ class Visitor:
         picture.save(file, "PNG", pnginfo=text)
         return file.getvalue()
 
+    def _show_command(self) -> None:
+        """Again only where it has changed: what is selected of it would no longer be."""
+        content = COMMAND.format(html.escape(self._command_line()))
+        if content != self._command.content:
+            self._command.content = content
+
     def _command_line(self) -> str:
+        """With as many samples per pixel as are seen, rounded down to a power of two."""
         wish, last = self.wish, self._last
-        seen = last is not None and last.view.place == wish.place
-        samples = last.view.samples if last is not None and seen else 0
-        return self._command_for(wish, samples) or "no command makes pictures of buffers"
+        samples = 0 if last is None or last.view.place != wish.place else last.view.samples
+        rounded = 1 << samples.bit_length() >> 1
+        return self._command_for(wish, rounded) or "no command makes pictures of buffers"
 
     def _command_for(self, wish: Wish, samples: int) -> str | None:
         """What makes a picture without the page; None of a buffer.
@@ -199,7 +211,7 @@ class Visitor:
         place, screen = wish.place, wish.screen
         if "buffers" in screen.needs:
             return None
-        v = ",".join(f"{number:.6g}" for number in place.v)
+        v = ",".join(f"{number:.9g}" for number in place.v)
         words = [f"run={self._subject.folder}", f"v=[{v}]", f"resolution={place.resolution}"]
         if self._subject.scene is not None:
             words.append(f"scene={self._subject.scene}")

@@ -122,8 +122,9 @@ def picture(page: playwright.Page) -> np.ndarray:
 
 def command(page: playwright.Page) -> str:
     """The command line that the page shows."""
-    values = [field.input_value() for field in page.locator("input.mantine-TextInput-input").all()]
-    return next(value for value in values if value.startswith("ngi render"))
+    shown = page.locator("code", has_text="ngi ").text_content()
+    assert shown is not None
+    return shown
 
 
 def set_slider(page: playwright.Page, number: int, value: float) -> None:
@@ -181,6 +182,11 @@ def test_the_page_shows_what_is_computed_without_it(
         assert "v=[0.05,0.1,0.15]" in options
         page.wait_for_timeout(1000)
         np.testing.assert_array_equal(picture(page), rendered(trained, options))
+        page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+        page.get_by_role("button", name="copy").click()
+        assert page.evaluate("navigator.clipboard.readText()") == command(page)
+        page.locator("code", has_text="ngi ").click()
+        assert page.evaluate("getSelection().toString()").strip() == command(page)
         set_slider(page, 0, 2)
         brighter = wait_until_changed(page, before)
         assert brighter.mean() > before.mean()

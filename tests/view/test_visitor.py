@@ -1,5 +1,6 @@
 """What the page shows a browser, which is a stand-in."""
 
+import re
 import shlex
 from contextlib import closing
 from dataclasses import replace
@@ -7,6 +8,7 @@ from io import BytesIO
 from threading import Thread, get_ident
 from types import SimpleNamespace
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -173,8 +175,8 @@ def test_the_command_makes_what_is_seen(browser: Browser) -> None:
     ("show", "sizes", "references"),
     [
         ("network", [64], []),
-        ("path tracer", [64], ["reference=24"]),
-        ("network | path tracer | error", [64], ["reference=24"]),
+        ("path tracer", [64], ["reference=16"]),
+        ("network | path tracer | error", [64], ["reference=16"]),
         ("error", [32], ["reference=8"]),  # which is a preview
         ("error", [], ["reference=8"]),
     ],
@@ -190,14 +192,45 @@ def test_the_command_traces_as_many_paths_as_are_seen(
         for _ in range(3):
             view.trace()
         made.show(Shown(made.wish.screen.pixels(view), view, Wish(place, made.wish.screen), True))
-    words = shlex.split(made._command.value)
+    words = shlex.split(command(made))
     assert [word for word in words if word.startswith("reference=")] == references
 
 
 def test_no_command_makes_the_picture_of_a_buffer(browser: Browser) -> None:
     made = visitor(browser)
     made._panel._show.value = "albedo"
-    assert made._command.value == "no command makes pictures of buffers"
+    assert command(made) == "no command makes pictures of buffers"
+
+
+def command(made: Visitor) -> str:
+    """What is selected as the command, without its markup."""
+    code = ElementTree.fromstring(made._command.content).find("code")
+    assert code is not None
+    assert code.text is not None
+    return code.text
+
+
+def test_the_command_has_v_to_the_last_bit_and_markup_is_text(browser: Browser) -> None:
+    made = Visitor(browser, replace(subject(), scene="<b>&a"), studio(), resolution=64)  # type: ignore[arg-type]
+    v = np.random.default_rng(0).random(7).tolist()
+    made._panel.set_v(v)
+    words = shlex.split(command(made))
+    options = read_options(PictureOptions, "ngi render", words[2:])
+    assert torch.tensor(options.v).equal(torch.tensor(v))
+    assert options.scene == "<b>&a"
+
+
+def test_the_command_stays_as_it_is_while_paths_are_added(browser: Browser) -> None:
+    """What is selected in it would be lost."""
+    made = visitor(browser)
+    made._panel._show.value = "path tracer"
+    view = SceneView(made.wish.place, AnalyticRenderer(dimensions=7, patch_size=16), coloured)
+    seen = []
+    for _ in range(9):
+        view.trace()
+        made.show(Shown(made.wish.screen.pixels(view), view, made.wish, full=True))
+        seen.append(re.findall(r"reference=(\d+)", command(made)))
+    assert seen == [[str(samples)] for samples in (8, 16, 16, 32, 32, 32, 32, 64, 64)]
 
 
 def test_what_it_says_takes_the_same_room_and_is_no_markup(browser: Browser) -> None:
