@@ -39,6 +39,9 @@ class SceneView:
 
     seconds: by part, of its last computation: buffers, network, paths
     samples: per pixel of `reference` so far
+
+    `_total`, [2, H, W, 3], sums the even passes and the odd ones, `_finite`, [2, H, W, 1], counts
+    how many of them were finite.
     """
 
     place: Place
@@ -84,15 +87,30 @@ class SceneView:
             self.trace()
         assert self._total is not None
         assert self._finite is not None
-        return (self._total / self._finite).float()
+        return (self._total.sum(dim=0) / self._finite.sum(dim=0)).float()
+
+    @property
+    def noise(self) -> Tensor | None:
+        """[H, W, 3]: about as far as `reference` is off; None where it has a single pass.
+
+        Half of the difference between the means of the even passes and of the odd ones; 0 where
+        one of the two has no finite pixel.
+        """
+        if self._total is None or self._finite is None or self.samples < 2 * PASS_SAMPLES:
+            return None
+        even, odd = self._total / self._finite
+        return (0.5 * (even - odd)).nan_to_num(0.0, 0.0, 0.0).float()
 
     def trace(self) -> None:
         """Adds a pass to the reference."""
         radiance = self._timed("paths", self._trace_pass)
         finite = radiance.isfinite().all(dim=-1, keepdim=True)
-        visible = torch.where(finite, radiance, 0.0)
-        self._total = visible if self._total is None else self._total + visible
-        self._finite = finite.double() if self._finite is None else self._finite + finite
+        if self._total is None or self._finite is None:
+            self._total = radiance.new_zeros(2, *radiance.shape)
+            self._finite = radiance.new_zeros(2, *finite.shape)
+        half = self.samples // PASS_SAMPLES % 2
+        self._total[half] += torch.where(finite, radiance, 0.0)
+        self._finite[half] += finite
         self.samples += PASS_SAMPLES
 
     def forget_prediction(self) -> None:

@@ -16,6 +16,7 @@ from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
 from ngi.evaluate import image_metrics
+from ngi.evaluate.metrics import mape
 from ngi.evaluate.pictures import WHITE, side_by_side
 from ngi.render.exr import write_exr
 from ngi.view.panel import Panel
@@ -135,18 +136,17 @@ class Visitor:
         return (len(recent) - 1) / (recent[-1] - recent[0])
 
     def _metrics(self, shown: Shown) -> str:
-        smallest = self._subject.protocol.ssim_window
-        if min(shown.view.prediction.shape[:2]) < smallest:
+        view, protocol = shown.view, self._subject.protocol
+        smallest = protocol.ssim_window
+        if min(view.prediction.shape[:2]) < smallest:
             return f"metrics take {smallest} pixels a side"
-        measured = image_metrics(
-            shown.view.prediction,
-            shown.view.reference,
-            protocol=self._subject.protocol,
-            lpips=None,
-        )
-        return ", ".join(
-            f"{name.upper()} {value:.3g}" for name, value in measured.items() if value is not None
-        )
+        reference = view.reference
+        measured = image_metrics(view.prediction, reference, protocol=protocol, lpips=None)
+        said = {name: f"{value:.3g}" for name, value in measured.items() if value is not None}
+        if view.noise is not None:
+            noise = mape(reference + view.noise, reference, protocol.epsilon)
+            said["mape"] += f" (path tracer's noise about {noise:.2g})"
+        return ", ".join(f"{name.upper()} {value}" for name, value in said.items())
 
     def _add_files(self) -> None:
         gui, client = self._client.gui, self._client

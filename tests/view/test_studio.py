@@ -76,6 +76,8 @@ def test_pixels_that_are_not_finite_are_left_out_of_the_mean() -> None:
     assert view.reference[0, 0].isnan().all()
     view.trace()
     assert view.reference.isfinite().all()
+    assert view.noise is not None
+    assert view.noise[0, 0].tolist() == [0, 0, 0]
 
 
 def test_browsers_take_turns_and_new_pictures_come_before_better_ones() -> None:

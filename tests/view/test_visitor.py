@@ -19,6 +19,7 @@ from skimage.feature import match_template
 viser = pytest.importorskip("viser", reason="needs pip install -e .[viewer]")
 
 from ngi.config.options import read_options  # noqa: E402
+from ngi.evaluate.metrics import mape  # noqa: E402
 from ngi.render import AnalyticRenderer  # noqa: E402
 from ngi.view.page import Page  # noqa: E402
 from ngi.view.picture import PictureOptions  # noqa: E402
@@ -257,6 +258,28 @@ def test_where_reset_view_leads_is_where_a_page_begins() -> None:
 def test_pictures_too_small_for_the_metrics_are_shown_without(browser: Browser) -> None:
     for side, said in ((8, "metrics take 11 pixels a side"), (16, "MAPE")):
         picture = torch.rand(side, side, 3, generator=torch.Generator().manual_seed(0))
-        view: Any = SimpleNamespace(prediction=picture, reference=picture / 2)
+        view: Any = SimpleNamespace(prediction=picture, reference=picture / 2, noise=None)
         shown: Any = SimpleNamespace(view=view)
         assert visitor(browser)._metrics(shown).startswith(said)
+
+
+@pytest.mark.parametrize("passes", [1, 2, 7, 8])
+def test_the_noise_said_is_how_far_the_path_traced_picture_is_off(
+    browser: Browser, passes: int
+) -> None:
+    made = visitor(browser)
+    made._panel._show.value = "error"
+    noisy = AnalyticRenderer(dimensions=7, patch_size=16, noise=0.5)
+    view = SceneView(made.wish.place, noisy, coloured)
+    for _ in range(passes):
+        view.trace()
+    truth = AnalyticRenderer(dimensions=7, patch_size=16).render_image(
+        view.place.tensor(), resolution=64, samples_per_pixel=1, seed=0
+    )
+    metrics = made._metrics(Shown(made.wish.screen.pixels(view), view, made.wish, full=True))
+    found = re.match(r"MAPE [\d.]+ \(path tracer's noise about ([\d.]+)\), DSSIM", metrics)
+    if passes == 1:
+        assert found is None
+        return
+    assert found is not None
+    assert float(found[1]) == pytest.approx(mape(view.reference, truth, 0.01), rel=0.1)
