@@ -17,6 +17,7 @@ from websockets.asyncio import server as websockets_server
 from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
 
+from ngi.view.session import Wish
 from ngi.view.studio import Studio
 from ngi.view.subject import Subject
 from ngi.view.visitor import Visitor
@@ -122,10 +123,13 @@ def _checking_origins(host: str) -> Iterator[None]:
 class Page:
     """Serves a page about `subject`, with the pictures that `studio` makes.
 
-    resolution: pixels a side at first
-    host: '127.0.0.1' for browsers of this machine only
+        resolution: pixels a side at first
+        host: '127.0.0.1' for browsers of this machine only
 
-    `where` is its address, with the tunnel for it where the port was taken.
+    A browser that comes begins with what the last one that left was looking at, so that one whose
+    connection was lost goes on; its button "reset" leads to where the page begins.
+
+        `where` is its address, with the tunnel for it where the port was taken.
     """
 
     def __init__(
@@ -137,6 +141,8 @@ class Page:
         self._studio = studio
         self._subject = subject
         self._resolution = resolution
+        self._visitors: dict[int, Visitor] = {}
+        self._left: Wish | None = None
         self._server = viser_server(host=host, port=port, label=subject.name)
         self._server.gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
         self._server.gui.main_panel.dock_right()
@@ -145,7 +151,7 @@ class Page:
             first.position, first.look_at = subject.camera.view(subject.start)
             first.up = np.asarray(subject.camera.up)
         self._server.on_client_connect(self._welcome)
-        self._server.on_client_disconnect(lambda client: studio.close(client.client_id))
+        self._server.on_client_disconnect(self._leave)
         found = self._server.get_port()
         self.where = address(host, found)
         if port not in (0, found):
@@ -167,6 +173,15 @@ class Page:
 
     def _welcome(self, client: viser.ClientHandle) -> None:
         visitor = Visitor(client, self._subject, self._studio, resolution=self._resolution)
+        if self._left is not None:
+            visitor.restore(self._left)
+        self._visitors[client.client_id] = visitor
         self._studio.open(client.client_id, visitor.wish, visitor.show, visitor.failed)
         if client.client_id not in self._server.get_clients():  # it left while that was built
-            self._studio.close(client.client_id)
+            self._leave(client)
+
+    def _leave(self, client: viser.ClientHandle) -> None:
+        """What it looked at is kept for the next: Viser tells no one apart who comes back."""
+        self._studio.close(client.client_id)
+        if (visitor := self._visitors.pop(client.client_id, None)) is not None:
+            self._left = visitor.wish

@@ -13,6 +13,7 @@ import viser
 
 from ngi.evaluate.pictures import ERROR_RANGE, error_colours
 from ngi.view.inputs import Control, Input, Picker, inputs
+from ngi.view.scene_view import Place
 from ngi.view.screen import CURVES, PARTS, Screen
 
 RESOLUTIONS = ("64", "128", "256", "384", "512", "768", "900")
@@ -103,6 +104,12 @@ class Panel:
         for each, value in self._at_first:
             each.value = value
         self.set_v(self._start)
+
+    def restore(self, place: Place, screen: Screen) -> None:
+        """As another browser's panel of the same page was."""
+        self._show.value, self._resolution.value = screen.show, str(place.resolution)
+        self._curve.value, self._exposure.value = screen.curve, screen.exposure
+        self.set_v(place.v)
 
     def load(self, content: bytes) -> None:
         """A configuration that `saved` gave; ValueError for anything else."""

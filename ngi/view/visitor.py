@@ -72,6 +72,10 @@ class Visitor:
     def wish(self) -> Wish:
         return Wish(self._place, self._panel.screen)
 
+    def restore(self, wish: Wish) -> None:
+        """Sets everything as it was in another browser of the same page."""
+        self._panel.restore(wish.place, wish.screen)
+
     def show(self, shown: Shown) -> None:
         """Sends a picture; in the thread that made it."""
         begin = perf_counter()

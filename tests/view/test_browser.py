@@ -257,6 +257,18 @@ def test_two_browsers_and_a_configuration_that_is_saved_and_loaded(
         np.testing.assert_array_equal(wait_until_changed(theirs, start), changed)
 
 
+def test_a_page_that_is_opened_again_shows_what_it_showed(
+    trained: Path, browser: playwright.Browser
+) -> None:
+    with viewer(trained, free_port()) as address:
+        page = opened(browser, address)
+        start = picture(page)
+        set_slider(page, 1, 0.9)
+        left = wait_until_changed(page, start)
+        page.close()
+        np.testing.assert_array_equal(picture(opened(browser, address)), left)
+
+
 def test_a_lost_connection_comes_back(trained: Path, browser: playwright.Browser) -> None:
     port = free_port()
     with viewer(trained, port) as address:

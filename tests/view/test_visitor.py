@@ -43,6 +43,28 @@ def test_a_browser_that_left_while_its_controls_were_made_is_drawn_nothing(
     assert not made.waiting
 
 
+def test_who_comes_back_sees_what_the_last_one_left(browser: Browser) -> None:
+    page = Page(studio(), subject(), resolution=64, host="127.0.0.1", port=0)
+    with closing(page):
+        page._server.get_clients = lambda: {1: browser, 2: browser}  # type: ignore[method-assign, assignment, dict-item]
+        page._welcome(browser)  # type: ignore[arg-type]
+        first = page._visitors[1]
+        start = first.wish
+        first._panel.set_v([0.25] * 7)
+        panel = first._panel
+        panel._show.value, panel._resolution.value = "error", "128"
+        panel._curve.value, panel._exposure.value = "filmic", 1.5
+        page._leave(browser)  # type: ignore[arg-type]
+        browser.client_id = 2
+        page._welcome(browser)  # type: ignore[arg-type]
+        again = page._visitors[2]
+        assert [*page._visitors] == [2]
+        assert again.wish == Wish(Place((0.25,) * 7, 128), Screen("error", "filmic", 1.5))
+        assert page._studio._browsers[2].session.wish == again.wish
+        again._panel.reset()
+        assert again.wish == start
+
+
 @pytest.mark.parametrize(("show", "parts"), [("network", 1), ("network | path tracer", 2)])
 def test_pictures_side_by_side_have_their_names_above_them(
     browser: Browser, show: str, parts: int
