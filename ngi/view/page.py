@@ -40,13 +40,17 @@ def viser_server(*, host: str, port: int, label: str | None = None) -> viser.Vis
     Any page that a browser shows may open a websocket to this machine, and says truly where it is
     from: that has to be this server, as the browser was told its name (through a tunnel the port
     may differ). Bound to a loopback address, the name must be one too, so that no foreign name that
-    resolves to it does. Programs that are no browsers give no origin and are let in.
+    resolves to it does. Programs that are no browsers give no origin and are let in. It is shared
+    with no public host, whoever asks.
 
     Raises ValueError as `check_address` does.
     """
     check_address(host, port)
     with _checking_origins(host):
-        return viser.ViserServer(host=host, port=port, label=label, verbose=False)
+        server = viser.ViserServer(host=host, port=port, label=label, verbose=False)
+    # any browser may ask by a message for a tunnel to a public host, without a button for it too
+    server.request_share_url = lambda *_, **__: None  # type: ignore[method-assign]
+    return server
 
 
 def address(host: str, port: int) -> str:

@@ -3,12 +3,14 @@
 import socket
 from collections.abc import Iterator
 from contextlib import closing
+from threading import Event
 from urllib.parse import urlsplit
 
 import pytest
 
 viser = pytest.importorskip("viser", reason="needs pip install -e .[viewer]")
 
+import msgspec  # noqa: E402
 from websockets.exceptions import InvalidStatus  # noqa: E402
 from websockets.sync.client import connect  # noqa: E402
 from websockets.typing import Origin, Subprotocol  # noqa: E402
@@ -45,6 +47,22 @@ def test_pages_of_other_origins_are_refused(port: int) -> None:
 def test_its_own_page_and_programs_are_let_in(port: int) -> None:
     assert opened(port, f"http://127.0.0.1:{port}")
     assert opened(port, None)
+
+
+def test_no_browser_can_have_it_shared_with_a_public_host(
+    monkeypatch: pytest.MonkeyPatch, port: int
+) -> None:
+    tunnels: list[str] = []
+    asked = Event()
+
+    monkeypatch.setattr("viser._viser.ViserTunnel", lambda host, _: tunnels.append(host))
+    monkeypatch.setattr("viser._viser.print_threadpool_errors", lambda _: asked.set())
+    with connect(
+        f"ws://127.0.0.1:{port}", subprotocols=[Subprotocol(f"viser-v{viser.__version__}")]
+    ) as browser:
+        browser.send(msgspec.msgpack.encode({"type": "ShareUrlRequest"}))
+        assert asked.wait(60)
+    assert tunnels == []
 
 
 @pytest.mark.parametrize(
