@@ -86,8 +86,12 @@ class Visitor:
         self._panel.say(self._status(shown, sending=perf_counter() - begin))
 
     def failed(self, error: Exception) -> None:
-        """Tells why there is no picture, or no file."""
-        self._panel.say([f"This failed: {str(error) or type(error).__name__}"])
+        """Tells why there is no picture."""
+        self._panel.say([f"This failed: {_reason(error)}"])
+
+    def _not_saved(self, error: Exception) -> None:
+        """Where the next picture does not push it out."""
+        self._client.add_notification("This file cannot be made", _reason(error), color="red")
 
     @property
     def _place(self) -> Place:
@@ -184,7 +188,7 @@ class Visitor:
             made = content(self._studio.view(wish.place), wish)
             send(name, made, save_immediately=True)
 
-        self._studio.ask(errand, self.failed)
+        self._studio.ask(errand, self._not_saved)
 
     def _png(self, view: SceneView, wish: Wish) -> bytes:
         """Carries the command that makes it as text, "command", where there is one."""
@@ -228,6 +232,10 @@ class Visitor:
         if screen.curve != "sRGB":
             words.append(f"tone_mapping={screen.curve}")
         return shlex.join(["ngi", "render", *words, "out=picture.png"])
+
+
+def _reason(error: Exception) -> str:
+    return str(error) or type(error).__name__
 
 
 def _exr(view: SceneView, wish: Wish) -> bytes:

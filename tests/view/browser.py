@@ -32,6 +32,7 @@ class Browser:
         self.gui = gui
         self.shown: list[tuple[np.ndarray, str]] = []
         self.files: dict[str, bytes] = {}
+        self.notified: list[tuple[str, str]] = []
         self.camera = SimpleNamespace(
             position=np.zeros(3),
             look_at=np.ones(3),
@@ -59,6 +60,10 @@ class Browser:
     def send_file_download(self, name: str, content: bytes, *, save_immediately: bool) -> None:
         assert save_immediately
         self.files[name] = content
+
+    def add_notification(self, title: str, body: str, *, color: str) -> None:
+        assert color == "red"
+        self.notified.append((title, body))
 
     def says(self, position: Any, look_at: Any, *, at: float | None = None) -> None:
         """Where its camera is; at: when that was received, now where it is None."""

@@ -159,6 +159,20 @@ def test_a_saved_picture_of_a_buffer_names_no_command(browser: Browser) -> None:
     assert "command" not in Image.open(BytesIO(browser.files["picture.png"])).info
 
 
+def test_why_there_is_no_file_stays_whatever_is_shown_next(
+    browser: Browser, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError("no space left")
+
+    monkeypatch.setattr("ngi.view.visitor.write_exr", full)
+    about = studio()
+    made = Visitor(browser, subject(), about, resolution=64)  # type: ignore[arg-type]
+    press(made, "radiance (EXR)")
+    assert about.work(wait=0)
+    assert browser.notified == [("This file cannot be made", "no space left")]
+
+
 @pytest.mark.parametrize("full", [False, True])
 def test_metrics_are_of_whole_pictures_alone(browser: Browser, full: bool) -> None:
     made = visitor(browser)
