@@ -3,6 +3,7 @@
 import html
 import json
 import random
+from collections import deque
 from collections.abc import Callable, Sequence
 from itertools import groupby
 from threading import RLock
@@ -20,6 +21,7 @@ RESOLUTIONS = ("64", "128", "256", "384", "512", "768", "900")
 CHOOSE = "choose …"
 STATUS = "height: 7em; overflow-y: auto; padding: 0 1em; font-size: 0.85em; line-height: 1.4"
 """Of what is said: a click that falls while a button moves is lost."""
+MOST_STEPS_BACK = 50
 MOST_SLIDERS = 200
 """More variables than that are set by presets alone: a browser draws every slider."""
 
@@ -58,6 +60,7 @@ class Panel:
         self._epsilon = epsilon
         self._on_change = on_change
         self._inputs: list[tuple[Input, Any]] = []
+        self._before: deque[list[float]] = deque(maxlen=MOST_STEPS_BACK)
         self._status = gui.add_html("")
         self.say(["…"])
         self._error_scale = gui.add_image(
@@ -99,11 +102,26 @@ class Panel:
                 made.value = each.shown(self._v)
             self._on_change()
 
+    def jump(self, v: Sequence[float]) -> None:
+        """As `set_v`, and `back` leads to where v was."""
+        with self.lock:
+            self._before.append(self._v)
+            self.set_v(v)
+
+    def back(self) -> None:
+        """To where v was before the last jump that is not undone yet; nothing where there is none.
+
+        The last `MOST_STEPS_BACK` are known.
+        """
+        with self.lock:
+            if self._before:
+                self.set_v(self._before.pop())
+
     def reset(self) -> None:
         """Everything as it was at first."""
         for each, value in self._at_first:
             each.value = value
-        self.set_v(self._start)
+        self.jump(self._start)
 
     def restore(self, place: Place, screen: Screen) -> None:
         """As another browser's panel of the same page was."""
@@ -119,7 +137,7 @@ class Panel:
             raise ValueError('expected a JSON file with {"v": [numbers]}') from error
         if len(v) != len(self._v) or not all(0 <= number <= 1 for number in v):
             raise ValueError(f"v has to be {len(self._v)} numbers from 0 to 1")
-        self.set_v(v)
+        self.jump(v)
 
     def saved(self) -> bytes:
         """The configuration as a file's content."""
@@ -128,18 +146,20 @@ class Panel:
     def _add_presets(self) -> None:
         menu: Any = self._gui.add_dropdown("configuration", (CHOOSE, *self._presets))
         anywhere = self._gui.add_button("random configuration")
+        back = self._gui.add_button("back", hint="v as it was before that; also after reset")
         reset = self._gui.add_button("reset", hint="everything as it was at first")
 
         @menu.on_update  # type: ignore[untyped-decorator]
         def _(_: object) -> None:
             if menu.value != CHOOSE:
-                self.set_v(self._presets[menu.value])
+                self.jump(self._presets[menu.value])
                 menu.value = CHOOSE  # so that the same can be chosen again
 
         @anywhere.on_click
         def _(_: object) -> None:
-            self.set_v([random.random() for _ in self._v])
+            self.jump([random.random() for _ in self._v])
 
+        back.on_click(lambda _: self.back())
         reset.on_click(lambda _: self.reset())
 
     def _add_screen(self, buffers: Sequence[str], resolution: int) -> None:

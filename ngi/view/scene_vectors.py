@@ -40,7 +40,7 @@ def key_frames(path: str, run: TrainedRun | PathTracedRun, *, still: int) -> Ten
 
     path: 'camera' for the scene's own path, which of closed formulas is that through the hard
         frames; 'hard_frames'; 'static' for the hard frame `still` alone; or a JSON file with a
-        list of v.
+        list of v, or with {"v": v} as the viewer saves it.
     Raises ValueError for anything else.
     """
     if path == "static":
@@ -77,6 +77,8 @@ def _read(file: Path, *, dimensions: int) -> Tensor:
         vectors = json.loads(file.read_text())
     except ValueError as error:
         raise ValueError(f"path: {file} is no JSON file ({error})") from error
+    if isinstance(vectors, dict) and "v" in vectors:
+        vectors = [vectors["v"]]
     if not isinstance(vectors, list) or not vectors:
         raise ValueError(f"path: {file} holds no list of v")
     return torch.stack(

@@ -121,6 +121,43 @@ def test_reset_brings_everything_back(gui: viser.GuiApi) -> None:
     assert (made.v, made.screen, made.resolution) == (start, screen, pixels)
 
 
+def test_the_way_back_leads_over_every_jump_and_ends(gui: viser.GuiApi) -> None:
+    made = panel(gui, shipped("mirror"), [])
+    start = made.v
+    places = [tuple(0.001 * (step + 1) for _ in start) for step in range(60)]
+    for place in places:
+        made.jump(place)
+    walked = (0.75, *places[-1][1:])
+    made.set_v(walked)  # as a mouse does, which is no jump
+    made.reset()
+    made.load(b'{"v": [1' + b", 1" * (len(start) - 1) + b"]}")
+    seen = []
+    for _ in range(60):
+        made.back()
+        seen.append(made.v)
+    assert seen[:3] == [start, walked, places[-2]]
+    assert set(seen[49:]) == {places[11]}  # fifty steps, then no further
+
+
+@pytest.mark.parametrize("button", ["random configuration", "reset"])
+def test_back_brings_v_back(gui: viser.GuiApi, button: str) -> None:
+    made = panel(gui, shipped("mirror"), [])
+    chosen = tuple(0.5 for _ in made.v)
+    made.set_v(chosen)
+    press(gui, button)
+    assert made.v != chosen
+    press(gui, "back")
+    assert made.v == chosen
+
+
+def press(gui: viser.GuiApi, label: str) -> None:
+    """The newest of these buttons."""
+    handles = gui._gui_input_handle_from_uuid.values()
+    *_, button = (each for each in handles if getattr(each, "label", None) == label)
+    for react in button._impl.update_cb:
+        react(None)  # type: ignore[arg-type]
+
+
 def test_nothing_stands_where_a_handle_would_cover_it(gui: viser.GuiApi) -> None:
     made = panel(gui, shipped("sphere-caustic"), [])
     sliders = [handle for part, handle in made._inputs if isinstance(part, Slider)]

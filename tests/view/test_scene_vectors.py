@@ -1,9 +1,13 @@
 """Paths of v: through their key frames, smooth, inside the hypercube."""
 
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
 import pytest
 import torch
 
-from ngi.view.scene_vectors import along
+from ngi.view.scene_vectors import along, key_frames
 
 OPEN = torch.tensor([[0.0, 1.0, 0.2], [0.5, 0.0, 0.2], [1.0, 0.0, 0.3], [0.2, 0.9, 1.0]])
 CLOSED = torch.cat([OPEN, OPEN[:1]])
@@ -41,3 +45,14 @@ def test_paths_are_smooth_and_stay_between_their_key_frames(keys: torch.Tensor) 
 
 def test_a_single_key_frame_stands_still() -> None:
     assert torch.equal(along(OPEN[1:2], 3), OPEN[[1, 1, 1]])
+
+
+def test_what_the_viewer_saves_is_a_path_of_one_v(tmp_path: Path) -> None:
+    file = tmp_path / "v.json"
+    file.write_text('{"v": [0.25, 0.5, 1.0]}')
+    run: Any = SimpleNamespace(renderer=SimpleNamespace(dimensions=3), description=None)
+    assert key_frames(str(file), run, still=0).tolist() == [[0.25, 0.5, 1.0]]
+    for content, message in (('{"v": [2]}', r"v.json\[0\]: \[2\]"), ("{}", "no list of v")):
+        file.write_text(content)
+        with pytest.raises(ValueError, match=message):
+            key_frames(str(file), run, still=0)
