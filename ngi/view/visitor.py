@@ -5,6 +5,7 @@ import io
 import shlex
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Lock
@@ -17,7 +18,7 @@ from PIL.PngImagePlugin import PngInfo
 
 from ngi.evaluate import image_metrics
 from ngi.evaluate.metrics import mape
-from ngi.evaluate.pictures import WHITE, side_by_side
+from ngi.evaluate.pictures import WHITE, side_by_side, stacked
 from ngi.render.exr import write_exr
 from ngi.view.panel import Panel
 from ngi.view.scene_view import PASS_SAMPLES, Place, SceneView
@@ -99,7 +100,7 @@ class Visitor:
 
     def _send(self, shown: Shown) -> None:
         self._last, self._aspect = shown, self._window()
-        pixels = _fitted(_captioned(shown), self._aspect)
+        pixels = _fitted(_captioned(shown, self._aspect), self._aspect)
         exactly = shown.full or len(shown.pixels) <= SMALL
         self._client.scene.set_background_image(pixels, format="png" if exactly else "jpeg")
         self._client.flush()
@@ -247,13 +248,20 @@ def _exr(view: SceneView, wish: Wish) -> bytes:
         return path.read_bytes()
 
 
-def _captioned(shown: Shown) -> Pixels:
-    """Its picture, or several side by side, each under its name."""
+def _captioned(shown: Shown, aspect: float) -> Pixels:
+    """Its picture, or several, each under its name: one below the other in a window that is tall.
+
+    aspect: width / height of the window
+    """
     parts = shown.wish.screen.parts
     if len(parts) == 1:
         return shown.pixels
     pictures = [Image.fromarray(each) for each in np.split(shown.pixels, len(parts), axis=1)]
-    return np.asarray(side_by_side(pictures, parts, paper=(GREY,) * 3, ink=WHITE))
+    row = partial(side_by_side, paper=(GREY,) * 3, ink=WHITE)
+    if aspect >= 1:
+        return np.asarray(row(pictures, parts))
+    named = zip(pictures, parts, strict=True)
+    return np.asarray(stacked([row([picture], [part]) for picture, part in named]))
 
 
 def _fitted(pixels: Pixels, aspect: float) -> Pixels:

@@ -10,7 +10,17 @@ from skimage.color import rgb2xyz
 viser = pytest.importorskip("viser", reason="needs pip install -e .[viewer]")
 
 from ngi.scene import read_scene, scenes, srgb  # noqa: E402
-from ngi.view.inputs import Control, Menu, Picker, Slider, Switch, controls, inputs  # noqa: E402  # noqa: E402
+from ngi.scene.kinds import KINDS  # noqa: E402
+from ngi.view.inputs import (  # noqa: E402
+    Control,
+    Menu,
+    Picker,
+    Slider,
+    Switch,
+    _controls,
+    controls,
+    inputs,
+)
 from ngi.view.page import viser_server  # noqa: E402
 from ngi.view.panel import Panel  # noqa: E402
 
@@ -164,6 +174,19 @@ def test_nothing_stands_where_a_handle_would_cover_it(gui: viser.GuiApi) -> None
     for slider in (made._exposure, *sliders):
         assert slider._marks == ()
         assert slider.hint.startswith("from ")
+
+
+@pytest.mark.parametrize(
+    ("kind", "numbers", "unit"),
+    [("rotation", 1, " degrees"), ("fov", 1, " degrees"), ("cone", 2, " degrees"),
+     ("direction", 2, " degrees"), ("translation", 3, ""), ("scale", 1, "")],
+)  # fmt: skip
+def test_angles_say_that_they_are_degrees(
+    gui: viser.GuiApi, kind: str, numbers: int, unit: str
+) -> None:
+    variable = KINDS[kind](("it",), minimum=(1.0,) * numbers, maximum=(2.0,) * numbers)  # type: ignore[call-arg]
+    hints = [made.add(gui, [0.5] * numbers).hint for made in inputs(_controls(variable, 0))]
+    assert hints == numbers * [f"from 1 to 2{unit}"]
 
 
 def test_a_range_that_falls_has_a_slider(gui: viser.GuiApi) -> None:

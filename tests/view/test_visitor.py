@@ -90,6 +90,25 @@ def test_pictures_side_by_side_have_their_names_above_them(
         assert match_template(half.mean(-1), picture.mean(-1)).max() > 0.999
 
 
+def test_pictures_are_one_below_the_other_in_a_window_that_is_tall(browser: Browser) -> None:
+    made = visitor(browser)
+    screen = Screen("network | path tracer | error")
+    renderer = AnalyticRenderer(dimensions=7, patch_size=16)
+    view = SceneView(Place((0.5,) * 7, SIZE), renderer, coloured)
+    shown = Shown(screen.pixels(view), view, Wish(view.place, screen), full=True)
+    browser.camera.image_width = browser.camera.image_height // 3
+    made.show(shown)
+    ((tall, _),) = browser.shown
+    assert 3 * SIZE < tall.shape[0] < 4 * SIZE
+    for column, picture in enumerate(np.split(shown.pixels, 3, axis=1)):
+        found = match_template(tall.mean(-1), picture.mean(-1))
+        assert found.max() > 0.999
+        assert np.unravel_index(found.argmax(), found.shape)[0] // SIZE == column
+    browser.camera.image_width = 2 * browser.camera.image_height  # it is made wide again
+    made._refit(browser.camera)  # type: ignore[arg-type]
+    assert browser.shown[-1][0].shape[0] < 2 * SIZE
+
+
 def test_a_windows_strip_gets_a_picture_all_the_same(browser: Browser) -> None:
     made = visitor(browser)
     view = SceneView(Place((0.5,) * 7, 64), AnalyticRenderer(dimensions=7, patch_size=16), coloured)
