@@ -34,6 +34,8 @@ RATE_OVER = 2.0
 """Seconds over which pictures per second are counted."""
 WIDEST = 8
 """Width / height of a window, or the other way round, from which on a picture does not fit."""
+FOLDER = '<div style="padding: 0 1em; font-size: 0.85em; overflow-wrap: anywhere">{}</div>'
+"""Titles cut off what tells runs apart."""
 COMMAND = """<div style="padding: 0 1em; font-size: 0.85em">
 <button onclick="navigator.clipboard.writeText(this.nextElementSibling.textContent)">copy</button>
 <code style="user-select: all; word-break: break-all">{}</code></div>"""
@@ -54,6 +56,7 @@ class Visitor:
         self._last: Shown | None = None
         self._aspect = 1.0
         self._sending = Lock()
+        client.gui.add_html(FOLDER.format(html.escape(str(subject.folder))))
         self._moments: deque[float] = deque(maxlen=100)
         self._panel = Panel(
             client.gui,

@@ -1,10 +1,12 @@
 """What the page shows a browser, which is a stand-in."""
 
+import html
 import re
 import shlex
 from contextlib import closing
 from dataclasses import replace
 from io import BytesIO
+from pathlib import Path
 from threading import Thread, get_ident
 from types import SimpleNamespace
 from typing import Any
@@ -17,6 +19,8 @@ from PIL import Image
 from skimage.feature import match_template
 
 viser = pytest.importorskip("viser", reason="needs pip install -e .[viewer]")
+
+from viser._messages import GuiHtmlMessage  # noqa: E402
 
 from ngi.config.options import read_options  # noqa: E402
 from ngi.evaluate.metrics import mape  # noqa: E402
@@ -287,6 +291,18 @@ def test_the_command_stays_as_it_is_while_paths_are_added(browser: Browser) -> N
         made.show(Shown(made.wish.screen.pixels(view), view, made.wish, full=True))
         seen.append(re.findall(r"reference=(\d+)", command(made)))
     assert seen == [[str(samples)] for samples in (8, 16, 16, 32, 32, 32, 32, 64, 64)]
+
+
+def test_the_runs_folder_is_said_in_full_where_it_wraps(browser: Browser) -> None:
+    folder = Path(*(f"<{20 * letter}>" for letter in "abcdef"))
+    about = replace(subject(), folder=folder)
+    Visitor(browser, about, studio(), resolution=64)  # type: ignore[arg-type]
+    buffer = browser.gui._websock_interface.get_message_buffer().message_from_id.values()
+    said = [m.props.content for m in buffer if isinstance(m, GuiHtmlMessage)]
+    assert any(
+        html.unescape(each).endswith(f">{folder}</div>") and "overflow-wrap: anywhere" in each
+        for each in said
+    )
 
 
 def test_what_it_says_takes_the_same_room_and_is_no_markup(browser: Browser) -> None:
