@@ -125,8 +125,9 @@ class Panel:
 
     def restore(self, place: Place, screen: Screen) -> None:
         """As another browser's panel of the same page was."""
-        self._show.value, self._resolution.value = screen.show, str(place.resolution)
-        self._curve.value, self._exposure.value = screen.curve, screen.exposure
+        wanted = (screen.show, str(place.resolution), screen.curve, screen.exposure)
+        for (each, _), value in zip(self._at_first, wanted, strict=True):
+            each.value = value
         self.set_v(place.v)
 
     def load(self, content: bytes) -> None:

@@ -98,8 +98,8 @@ class SceneView:
         """
         if self._total is None or self._finite is None or self.samples < 2 * PASS_SAMPLES:
             return None
-        even, odd = self._total / self._finite
-        return (0.5 * (even - odd)).nan_to_num(0.0, 0.0, 0.0).float()
+        means = self._total / self._finite
+        return (0.5 * (means[0] - means[1])).nan_to_num(0.0, 0.0, 0.0).float()
 
     def trace(self) -> None:
         """Adds a pass to the reference."""
