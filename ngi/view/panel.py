@@ -147,7 +147,8 @@ class Panel:
     def _add_presets(self) -> None:
         menu: Any = self._gui.add_dropdown("configuration", (CHOOSE, *self._presets))
         anywhere = self._gui.add_button("random configuration")
-        back = self._gui.add_button("back", hint="v as it was before that; also after reset")
+        hint = "to v before the last preset, random configuration, file or reset"
+        back = self._gui.add_button("back", hint=hint)
         reset = self._gui.add_button("reset", hint="everything as it was at first")
 
         @menu.on_update  # type: ignore[untyped-decorator]
