@@ -20,19 +20,21 @@ def main(argv: Sequence[str] | None = None) -> int:
         prog="ngi report",
         description="Compares every finished run below FOLDER: results.csv, .md and .tex (mean and "
         "95 % interval over seeds), error against run time (.png, .svg), comparison pictures of "
-        "the hard frames, and index.html, which has everything, the verdicts on the paper's claims "
-        "and the provenance of the runs in one file. Runs of different protocols, scene files or "
-        "references are refused.",
+        "the hard frames, and index.html, which combines all this with verdicts on the paper's "
+        "claims and the provenance of the runs. Refuses to compare runs with different protocols, "
+        "scene files or references.",
     )
-    parser.add_argument("folder", metavar="FOLDER", type=Path, help="searched for result.json")
+    parser.add_argument(
+        "folder", metavar="FOLDER", type=Path, help="folder to search for result.json"
+    )
     parser.add_argument(
         "--output", metavar="PATH", type=Path, help="where to write; by default FOLDER/report"
     )
     parser.add_argument(
         "--baseline",
         metavar="METHOD",
-        help="what all others are compared with, for example ours; by default uniform sampling "
-        "where that was run; the claims have their own",
+        help="method to compare all others with, for example ours; by default uniform sampling, "
+        "if there are runs of it; the claims have baselines of their own",
     )
     parser.add_argument(
         "--wandb",

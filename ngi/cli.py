@@ -25,38 +25,54 @@ class Verb:
 
 WAY = {
     "First": (
-        Verb("doctor", "ngi.commands.doctor", "what this machine has for rendering and training"),
-        Verb("train", "ngi.train", "train a network, or a sweep of runs; go on where it stopped"),
-        Verb("report", "analysis.report", "compare runs: tables, plots, verdicts on the claims"),
+        Verb("doctor", "ngi.commands.doctor", "check what this machine can render and train with"),
+        Verb("train", "ngi.train", "train a network or a sweep of runs; resumes where it stopped"),
+        Verb(
+            "report",
+            "analysis.report",
+            "compare runs: tables, plots, verdicts on the paper's claims",
+        ),
     ),
     "Look at a run": (
-        Verb("view", "ngi.view.__main__", "in the browser, with a slider for every variable"),
-        Verb("render", "ngi.view.picture", "one picture of any configuration, as PNG or EXR"),
-        Verb("video", "ngi.view.video", "a path through the scene, and how steady the network is"),
-        Verb("export", "ngi.view.export", "the network as one ONNX file, for other programs"),
+        Verb(
+            "view", "ngi.view.__main__", "show it in the browser, with a slider for every variable"
+        ),
+        Verb(
+            "render", "ngi.view.picture", "render one picture of any configuration, as PNG or EXR"
+        ),
+        Verb(
+            "video",
+            "ngi.view.video",
+            "film a path through the scene and measure temporal stability",
+        ),
+        Verb("export", "ngi.view.export", "save the network as one ONNX file, for other programs"),
     ),
     "Scenes": (
-        Verb("describe", "ngi.view.describe", "what varies in a scene, or could; what is wrong"),
-        Verb("gallery", "ngi.view.gallery", "a contact sheet of every scene"),
+        Verb(
+            "describe",
+            "ngi.view.describe",
+            "list what varies in a scene, or could, and what is wrong",
+        ),
+        Verb("gallery", "ngi.view.gallery", "make a contact sheet of every scene"),
     ),
     "Measure": (
         Verb(
             "costs",
             "ngi.studies.costs",
-            "what steps cost here, to count run time fairly when training",
+            "measure what steps cost here, for a fair run time in training",
         ),
-        Verb("metrics", "ngi.commands.metrics", "metrics again, from a run's linear pictures"),
+        Verb("metrics", "ngi.commands.metrics", "recompute metrics from a run's linear pictures"),
         Verb(
-            "benchmark", "ngi.studies.benchmark.__main__", "how fast every part of the program is"
+            "benchmark",
+            "ngi.studies.benchmark.__main__",
+            "measure how fast every part of the program is",
         ),
         Verb(
             "gpu-check",
             "ngi.studies.gpu_check.__main__",
-            "everything there is to find out on a GPU, in parts",
+            "take every measurement of a GPU, in parts",
         ),
-        Verb(
-            "stability", "ngi.studies.stability.__main__", "what becomes of extreme and stiff cases"
-        ),
+        Verb("stability", "ngi.studies.stability.__main__", "test extreme and stiff cases"),
     ),
 }
 """The verbs, in the order in which one meets them."""
@@ -92,7 +108,7 @@ def _run(arguments: Sequence[str] | None) -> int:
 def overview() -> str:
     """What `ngi --help` prints."""
     lines = ["Neural global illumination of variable scenes.", ""]
-    lines += ["  ngi VERB …          does it", "  ngi VERB --help     says what it takes"]
+    lines += ["  ngi VERB …          runs a verb", "  ngi VERB --help     shows its options"]
     for title, verbs in WAY.items():
         lines += ["", f"{title}:", *(f"  {verb.name:<11}{verb.help}" for verb in verbs)]
     return "\n".join(lines)

@@ -20,10 +20,10 @@ from ngi.cli import WAY, overview  # noqa: E402
 
 GROUPS = {
     "scene": "What varies. Every scene folder is an option too: see Scenes.",
-    "method": "The paper's method, its ablations and its competitors, as choices of other groups.",
-    "sampler": "Which states are proposed, and which of them chains go to.",
-    "reuse": "When stored patches are trained on again, and which.",
-    "resolution": "Of the images that patches are cut from, as training goes on.",
+    "method": "The paper's method, ours, ablations and competitors, as options of other groups.",
+    "sampler": "Which states are proposed, and which of them the chains accept.",
+    "reuse": "When to train on stored patches again, and on which.",
+    "resolution": "Of the images that patches are cut from, over the course of training.",
     "data": "What a training sample is.",
     "model": "The network.",
     "loss": "Between the network's log1p radiance and the path tracer's.",
@@ -34,8 +34,8 @@ GROUPS = {
     "evaluation": "Test frames, references and metrics.",
     "renderer": "What traces the patches.",
     "trainer": "Lightning's trainer: the precision.",
-    "tracker": "Who is told of the run's progress, beside its own files.",
-    "path_tracing": "Path tracing in the network's place; chosen by `method`.",
+    "tracker": "Where the run's progress is logged, in addition to its own files.",
+    "path_tracing": "Path tracing in place of the network; chosen by `method`.",
     "experiment": "What a sweep changes beyond its methods and scenes.",
 }
 
@@ -60,18 +60,19 @@ def commands() -> str:
     table = "\n".join(["| command | what for |", "| --- | --- |", *rows])
     return (
         f'# Commands\n\n```text title="ngi --help"\n{overview()}\n```\n\n'
-        "`ngi VERB --help` says what a verb takes. All but `report` and `gpu-check`, which take "
-        "`--flags`, take `key=value`; `train` and `costs` also Hydra's `group=option` "
-        "([Groups and options](options.md)), and `train` also `--dry-run`. Of the other verbs the "
-        "first key can be left out: `ngi describe mirror` is `ngi describe scene=mirror`.\n\n"
+        "`ngi VERB --help` shows a verb's options. `report` and `gpu-check` take `--flags`; all "
+        "others take `key=value`. `train` and `costs` also take Hydra's `group=option` "
+        "([Groups and options](options.md)), and `train` also `--dry-run`. With the other verbs "
+        "you can omit the first key: `ngi describe mirror` means `ngi describe scene=mirror`.\n\n"
         f"{table}\n\n"
-        "Further programs, for studies of the method itself, are started as modules: "
+        "Further programs, for studies of the method itself, run as modules: "
         "`python -m ngi.studies.noise`, `python -m ngi.studies.exploration_map` with "
         "`python -m analysis.exploration_map`, `python -m ngi.studies.ceiling` with "
         "`python -m analysis.ceiling`, `python -m analysis.endurance`.\n\n"
-        "The exit status is 0 where all went well, 130 after Ctrl-C, 143 after SIGTERM, and 1 or 2 "
-        "else. Of `describe`, `doctor`, `metrics` and `stability` 1 says that something was found, "
-        "2 that it could not be looked for; of `gpu-check` 3 says that there is more to measure.\n"
+        "The exit status is 0 on success, 130 after Ctrl-C, 143 after SIGTERM, and otherwise 1 or "
+        "2. From `describe`, `doctor`, `metrics` and `stability`, 1 means that a problem was "
+        "found, 2 that nothing could be checked; from `gpu-check`, 3 means that there is more to "
+        "measure.\n"
     )
 
 
@@ -85,7 +86,7 @@ def options() -> str:
         "",
         "Choose with `group=option`, change one value with `key=value`: "
         "`ngi train sampler=uniform sampler.chains=32`. `ngi train --cfg job --resolve …` shows "
-        "what a command line comes to. This page is written from `conf/`.",
+        "the configuration that a command line yields. This page is generated from `conf/`.",
         "",
         "## The whole",
         "",

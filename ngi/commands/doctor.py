@@ -19,7 +19,7 @@ from ngi.machine.size import usable_cores
 
 @dataclass
 class DoctorOptions:
-    """Says what this machine has for rendering and training, and how to get what is missing.
+    """Lists what this machine has for rendering and training, and how to get what is missing.
 
     Exit status 0 when the program can run here, 1 when it can't.
     """
@@ -67,7 +67,7 @@ def torch_device() -> Finding:
     build = "a CUDA build that sees no GPU" if torch.version.cuda else "a CPU build"
     return Finding(
         "PyTorch on a GPU", False, f"{build}; the CPU is used ({threads})",
-        "nothing, if there is no NVIDIA GPU; else install its driver and a CUDA build of PyTorch",
+        "without an NVIDIA GPU nothing; otherwise install its driver and a CUDA build of PyTorch",
     )  # fmt: skip
 
 
@@ -88,7 +88,7 @@ def optix() -> Finding:
     tool = shutil.which("nvidia-smi")
     if tool is None:
         return Finding(
-            name, False, "no NVIDIA driver", "install the NVIDIA driver, if there is a GPU"
+            name, False, "no NVIDIA driver", "if there is an NVIDIA GPU, install its driver"
         )
     query = [tool, "--query-gpu=name,driver_version", "--format=csv,noheader"]
     answer = subprocess.run(query, capture_output=True, text=True, check=False)

@@ -12,16 +12,16 @@ from ngi.config.options import option, run_tool
 @dataclass
 class MetricsOptions:
     """Recomputes the metrics of finished runs from the predictions and references in their
-    folders (linear/*.exr), and compares them with result.json, frame by frame. Nothing but the
-    run's folder is needed, for LPIPS AlexNet's weights too. Exit status 1 where something differs,
-    2 where a run cannot be checked.
+    folders (linear/*.exr), and compares them with result.json, frame by frame. Needs only the run's
+    folder and, for LPIPS, AlexNet's weights. Exit status 1 if something differs, 2 if a run cannot
+    be checked.
 
     ngi metrics run=outputs/demo
     """
 
     run: str = option("folder of a run, or any folder with runs below it")
     lpips_weights: str | None = option(
-        "AlexNet's; none: $NGI_LPIPS_WEIGHTS or PyTorch's cache", None
+        "file of AlexNet's weights; default: $NGI_LPIPS_WEIGHTS or PyTorch's cache", None
     )
 
 

@@ -23,16 +23,14 @@ class ViewOptions:
     """
 
     run: str = option("a run's folder, finished or not")
-    resolution: int = option("pixels a side at first", 256)
+    resolution: int = option("initial pixels a side", 256)
     supersampled_edges: bool = option(
-        "ask the network four times a pixel at edges: still pictures take longer",
+        "evaluate the network four times per pixel at edges: still pictures take longer",
         False,
     )
-    port: int = option("of the page", 8080)
-    host: str = option(
-        "0.0.0.0 lets other machines in, everybody who can reach this one", "127.0.0.1"
-    )
-    scene: str | None = option("of a run of the authors' files: their folder", None)
+    port: int = option("of the page; if it is taken, a later one", 8080)
+    host: str = option("0.0.0.0 lets in everybody who can reach this machine", "127.0.0.1")
+    scene: str | None = option("folder of the scene, if it is one of the paper's authors", None)
 
 
 def view(options: ViewOptions) -> None:

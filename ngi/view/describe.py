@@ -9,8 +9,8 @@ from ngi.config.options import option, run_tool
 
 @dataclass
 class DescribeOptions:
-    """Describes a variable scene, checks its camera, and says what a run leaves out; or lists what
-    could vary in a plain Mitsuba file and writes a scene.yaml to start from.
+    """Describes a variable scene, checks its camera, and lists the buffers that a run leaves out.
+    For a plain Mitsuba file: lists what could vary and writes a scene.yaml to start from.
 
     ngi describe sphere-caustic
     ngi describe scenes/lamp/scene.xml

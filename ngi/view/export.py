@@ -28,19 +28,19 @@ RANDOM_PIXELS = 1000
 
 @dataclass
 class ExportOptions:
-    """Writes a trained network as an ONNX file, which runs without this program and PyTorch.
+    """Writes a trained network as an ONNX file, which needs neither this program nor PyTorch.
 
     ngi export run=outputs/demo/sphere-caustic/method=uniform/seed=0
 
     Inputs: buffers [N, C] of any N pixels, and v [D] in [0, 1]. Output: radiance [N, 3], linear
-    RGB, negative where the network says so. All in float32. The file's metadata says what each
-    channel and each component of v is. Before it is written, ONNX Runtime runs it beside the
-    network, on random numbers and on the scene's first hard frame.
+    RGB, which may be slightly negative. All are float32. The file's metadata describes each channel
+    and each component of v. Before writing it, the command compares ONNX Runtime's output with the
+    network's, on random numbers and on the scene's first hard frame.
     """
 
     run: str = option("a run's folder, finished or not")
     out: str = option("file to write: .onnx", "network.onnx")
-    scene: str | None = option("of a run of the authors' files: their folder", None)
+    scene: str | None = option("folder of the scene, if it is one of the paper's authors", None)
 
 
 def export(options: ExportOptions) -> None:

@@ -15,9 +15,9 @@ class GalleryOptions:
     ngi gallery mirror salon-9 configurations=4
     """
 
-    scenes: list[str] | None = option("names; none: all scenes", None)
-    folder: str = option("where to", "outputs/gallery")
-    configurations: int = option("random v per scene", 8)
+    scenes: list[str] | None = option("names of scenes; default: all", None)
+    folder: str = option("folder to write to", "outputs/gallery")
+    configurations: int = option("number of random v per scene", 8)
     resolution: int = option("pixels a side", 160)
     samples_per_pixel: int = option("of every picture", 64)
     backend: str = option("auto, cuda, llvm or scalar", "auto")

@@ -18,13 +18,12 @@ KEPT_OF_RESULT = (
 
 @dataclass
 class PackOptions:
-    """Writes a folder with the network of a finished run, and nothing else of it.
+    """Writes a folder that holds only the network of a finished run.
 
     python -m ngi.view.pack run=outputs/demo/sphere-caustic/method=ours/seed=0 out=networks/sphere
 
-    It can be opened by view, render, video and export, where the scene is known by its name or
-    given by scene=FOLDER. Weights are the averaged ones where the run has such. It cannot be
-    trained on.
+    view, render, video and export can open it, if the scene is known by its name or given as
+    scene=FOLDER. It has the averaged weights if the run has any. It cannot be trained further.
     """
 
     run: str = option("a finished run's folder")

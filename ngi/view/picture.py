@@ -36,16 +36,18 @@ class PictureOptions:
 
     run: str = option("a run's folder, finished or not")
     out: str = option("file to write: .png or .exr (linear radiance)", "picture.png")
-    v: list[float] | None = option("configuration, D numbers from 0 to 1", None)
-    hard_frame: int = option("where there is no v: which of the scene's hard frames", 0)
+    v: list[float] | None = option("configuration: one number from 0 to 1 per component", None)
+    hard_frame: int = option("index of the scene's hard frame to render if v is not given", 0)
     resolution: int = option("pixels a side", 256)
-    exposure: float = option("stops, of PNG files", 0.0)
-    tone_mapping: str = option("of PNG files: sRGB, filmic or linear", "sRGB")
-    reference: int = option("samples per pixel of a path-traced picture beside it, with errors", 0)
-    supersampled_edges: bool = option(
-        "ask the network four times a pixel at edges: less error, longer frames", False
+    exposure: float = option("in stops, for PNG files", 0.0)
+    tone_mapping: str = option("for PNG files: sRGB, filmic or linear", "sRGB")
+    reference: int = option(
+        "samples per pixel of a path-traced picture to compare with; 0: none", 0
     )
-    scene: str | None = option("of a run of the authors' files: their folder", None)
+    supersampled_edges: bool = option(
+        "evaluate the network four times per pixel at edges: less error, slower", False
+    )
+    scene: str | None = option("folder of the scene, if it is one of the paper's authors", None)
 
 
 def write_picture(options: PictureOptions) -> None:

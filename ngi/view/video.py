@@ -21,40 +21,44 @@ if TYPE_CHECKING:
 
 @dataclass
 class VideoOptions:
-    """Films a path through a scene with a trained network, and measures how steady it is.
+    """Films a path through a scene with a trained network, and measures temporal stability.
 
     ngi video run=outputs/demo/sphere-caustic/method=uniform/seed=0 reference=64
     ngi video run=FOLDER beside=OTHER path=hard_frames seconds=20
     ngi video run=FOLDER path=static hard_frame=3 reference=64
     ngi video run=FOLDER out=film.webp seconds=4 frames_per_second=12   # for a README
 
-    Beside the film, a JSON file of the same name says what was measured: along a path that
-    moves, the error of the changes from frame to frame (with a reference); where v stands still,
-    flicker. `ngi report` tabulates every video*.json below its folder. What was measured is not
-    replaced by a video with other options: give that one another name, out=FILE.
+    A JSON file of the same name, next to the film, holds the measurements: along a moving path, the
+    error of the changes from frame to frame (needs a reference); for a static v, flicker.
+    `ngi report` tabulates every video*.json below its folder. A video with other options does not
+    overwrite these measurements: give it another name with out=FILE.
     """
 
-    run: str = option("a run's folder, finished or not; of path tracing, finished")
+    run: str = option("a run's folder, finished or not; a path tracing run must be finished")
     out: str | None = option(
-        "file to write, .mp4 or .webp; null: video_PATH.mp4 in the run's folder, with _3 for "
-        "hard_frame=3 of a static path and _supersampled for such edges",
+        "file to write, .mp4 or .webp; null: video_PATH.mp4 in the run's folder (with _3 for "
+        "path=static hard_frame=3, and _supersampled for supersampled_edges=true)",
         None,
     )
     path: str = option(
         "through v: camera (the scene's own), hard_frames, static, or a JSON file with a list of v",
         "camera",
     )
-    hard_frame: int = option("of path=static: which one", 0)
-    beside: list[str] | None = option("folder of another run of the scene; may be repeated", None)
-    reference: int = option("samples per pixel, an even number, of path-traced frames beside it", 0)
-    seconds: float = option("how long", 8.0)
+    hard_frame: int = option("for path=static: index of the hard frame", 0)
+    beside: list[str] | None = option(
+        "folder of another run of the scene to show too; may be repeated", None
+    )
+    reference: int = option(
+        "samples per pixel (even) of path-traced frames to compare with; 0: none", 0
+    )
+    seconds: float = option("length of the video", 8.0)
     frames_per_second: int = option("of the video", 24)
     resolution: int = option("pixels a side", 256)
     exposure: float = option("stops", 0.0)
     supersampled_edges: bool = option(
-        "ask networks four times a pixel at edges: less error, longer frames", False
+        "evaluate networks four times per pixel at edges: less error, slower", False
     )
-    scene: str | None = option("of a run of the authors' files: their folder", None)
+    scene: str | None = option("folder of the scene, if it is one of the paper's authors", None)
 
 
 def write_video(options: VideoOptions) -> None:

@@ -1,7 +1,7 @@
 """Measures the speed of generation, training, scoring and the store, as ratios inside one run.
 
-`ngi benchmark` prints tables and writes them as JSON. A ratio compares two things timed
-in turn, so that a slow or busy machine slows both; every figure is a median with its quartiles
+`ngi benchmark` prints tables and writes them as JSON. A ratio compares two things that are timed
+alternately, so that a slow or busy machine slows both. Every figure is a median with its quartiles
 unless its name says otherwise.
 """
 

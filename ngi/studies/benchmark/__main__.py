@@ -25,13 +25,13 @@ SHORT = ("living-room", "salon-25", "sphere-caustic")
 
 @dataclass
 class BenchmarkOptions:
-    parts: list[str] | None = option("what to measure, see above; none: everything", None)
+    parts: list[str] | None = option("what to measure, see above; default: everything", None)
     scenes: list[str] | None = option("scenes to render", None)
     release: list[str] | None = option("folders of the authors' scenes to render", None)
     samples_per_pixel: str | None = option(f"a number, or '{TRAINING}'", None)
-    patches: int | None = option("rendered by compilations and memory", None)
+    patches: int | None = option("number of patches that compilations and memory render", None)
     repeats: int = option("timings per figure", 20)
-    seconds: float = option("of timings per scene", 60.0)
+    seconds: float = option("for timings, per scene", 60.0)
     markdown: bool = option("print the tables as Markdown too", False)
     output: str = option("file to write", "outputs/benchmark.json")
 

@@ -27,7 +27,7 @@ def _part(name: str, text: str, scenes: tuple[str, ...] | None = ()) -> Part:
 PARTS = (
     _part(
         "overhead",
-        "a batch of patches, everything new, against one launch of as many paths; its steps",
+        "a batch of new patches against one launch of equally many paths; its steps",
         scenes=None,
     ),
     _part(
@@ -35,10 +35,12 @@ PARTS = (
         "seconds of the warm-up with and without cached kernels; kernels compiled after it",
         scenes=None,
     ),
-    _part("memory", "growth of a process that renders many patches", scenes=("cornell-box",)),
+    _part(
+        "memory", "memory growth of a process that renders many patches", scenes=("cornell-box",)
+    ),
     _part(
         "leaving-out",
-        "patches with what a scene needs against patches with everything",
+        "patches with only the buffers a scene needs against patches with all",
         scenes=None,
     ),
     _part("training", "a training step against the machine's matrix rate; scoring"),
@@ -64,12 +66,12 @@ PARTS = (
     ),
     _part(
         "frames",
-        "milliseconds of our frames by part, beside those of path tracing with a denoiser",
+        "milliseconds of our frames by part, against path tracing with a denoiser",
         scenes=("sphere-caustic",),
     ),
     _part(
         "viewer",
-        "pictures per second that the viewer shows while a slider moves, and how fine they are",
+        "pictures per second, and their resolution, that the viewer shows while a slider moves",
         scenes=("sphere-caustic",),
     ),
 )

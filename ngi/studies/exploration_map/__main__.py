@@ -16,7 +16,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         prog="python -m ngi.studies.exploration_map",
         description="When does exploration pay? Trains every sampler, target and acceptance rule, "
         "with and without reuse, on closed-form scenes with a knob for each cause, and writes "
-        "exploration_map.csv. Goes on where it was interrupted. "
+        "exploration_map.csv. Resumes where it was interrupted. "
         "`python -m analysis.exploration_map FOLDER` draws the map of --settings full; "
         "`python -m analysis.exploration_map.final_errors` has the errors of the others.",
     )
@@ -28,13 +28,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         choices=PLANS,
         default="full",
         help="default: full; ours: uniform sampling and predicted losses with our learner; "
-        "ours_long: in 4,000 steps, of losses without noise; "
-        "ours_by_loss: the same, stored patches drawn by loss; "
-        "ours_eager: and predicted losses without a bound to speak of; "
+        "ours_long: the same in 4,000 steps, predicting losses without noise; "
+        "ours_by_loss: as ours_long, stored patches drawn by loss; "
+        "ours_eager: as ours_by_loss, only predicted losses with hardly any bound; "
         "ours_longer, ours_eager_longer: uniform sampling and those in 16,000 steps, where 4,000 "
         "are too few; "
         "ours_chains: as ours_long, greedy chains with the paper's steps and with larger ones; "
-        "known_…: and a sampler that knows where the rare is, over so many steps",
+        "known_…: with a sampler that knows where the rare effects are, over so many steps",
     )
     parser.add_argument("--seeds", type=int, nargs="+", default=[0, 1, 2, 3, 4], metavar="SEED")
     parser.add_argument(

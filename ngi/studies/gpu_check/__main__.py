@@ -114,9 +114,21 @@ def _parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add = parser.add_argument
-    add("--dry-run", action="store_true", help="go through everything, tiny, without a GPU")
-    add("--minutes", type=float, default=math.inf, metavar="M", help="end in time; no limit")
-    add("--training-minutes", type=float, default=15.0, metavar="M", help="per run; 15")
+    add("--dry-run", action="store_true", help="run every check at a tiny size, without a GPU")
+    add(
+        "--minutes",
+        type=float,
+        default=math.inf,
+        metavar="M",
+        help="stop in time; default: no limit",
+    )
+    add(
+        "--training-minutes",
+        type=float,
+        default=15.0,
+        metavar="M",
+        help="training time per run; default: 15",
+    )
     add("--output", type=Path, default=Path("outputs/gpu-check"), metavar="FOLDER")
     return parser
 

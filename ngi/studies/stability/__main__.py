@@ -20,15 +20,15 @@ if TYPE_CHECKING:
 
 @dataclass
 class StabilityOptions:
-    """Runs extreme and stiff cases on every sampler, precision and backend at hand and says of
+    """Runs extreme and stiff cases on every available sampler, precision and backend. Reports for
     each: whether all numbers are finite, the error against the ordinary case or a closed form, what
-    was done about it (guard, clamp, resample, refuse), the verdict.
+    the program did about it (guard, clamp, resample, refuse), and the verdict.
     """
 
-    groups: list[str] | None = option("of cases; none: all", None)
+    groups: list[str] | None = option("of cases; default: all", None)
     matching: str = option("only cases with this in their names", "")
     output: str = option(
-        "folder for stability.csv and .md, of a part of the cases stability_part.*",
+        "folder for stability.csv and .md; for a part of the cases stability_part.*",
         "outputs/stability",
     )
 
