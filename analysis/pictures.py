@@ -103,7 +103,7 @@ def error_scale(run: Run, index: int) -> ErrorScale:
     try:
         text, name, maximum = said["scale"], said["colour_map"], said["maximum"]
     except KeyError as error:
-        raise OSError(f"{path} does not say its {error}") from error
+        raise OSError(f"{path}: its metadata lacks {error}; restore a copy") from error
     width, height = _BAR
     levels = np.tile(np.linspace(0, 1, width), (height, 1))
     colours = np.ascontiguousarray(matplotlib.colormaps[name](levels, bytes=True)[..., :3])

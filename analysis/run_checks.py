@@ -34,10 +34,10 @@ def check_result(result: dict[str, Any]) -> None:
         _ = version["commit"], version.get("dirty")
     for key, value in _texts(result):
         if not isinstance(value, str):
-            raise TypeError(f"{key} is {value!r}, which is no text")
+            raise TypeError(f"{key} is {value!r}, which is not a text")
     for key, value in _numbers(result):
         if not isinstance(value, int | float) or not _fits(value):
-            raise TypeError(f"{key} is {str(value)!r:.80}, which is no number")
+            raise TypeError(f"{key} is {str(value)!r:.80}, which is not a number")
 
 
 def _texts(result: dict[str, Any]) -> Iterator[tuple[str, Any]]:
@@ -105,24 +105,24 @@ def check_logs(folder: Path, result: dict[str, Any]) -> None:
     for name, recorded in result.get("logs", {}).items():
         file = folder / name
         if not file.is_file():
-            raise ValueError(f"{name} is gone; put back a copy")
+            raise ValueError(f"{name} is missing; restore it from a copy")
         if (size := file.stat().st_size) != recorded["bytes"]:
             raise ValueError(
                 f"{name} is damaged: it has {size:,} bytes, the run wrote {recorded['bytes']:,}; "
-                "put back a copy"
+                "restore it from a copy"
             )
         with file.open("rb") as stream:
             if hashlib.file_digest(stream, "sha256").hexdigest() != recorded["sha256"]:
                 raise ValueError(
                     f"{name} is damaged: its checksum is not the one in result.json; "
-                    "put back a copy"
+                    "restore it from a copy"
                 )
     if "logs" not in result:
         last = read_table(folder / "metrics.csv")["step"].iloc[-1]
         if last != result["steps"]:
             raise ValueError(
                 f"metrics.csv is cut short: it ends with step {last}, the run with step "
-                f"{result['steps']}; put back a copy"
+                f"{result['steps']}; restore it from a copy"
             )
 
 
@@ -144,5 +144,5 @@ def read_table(file: Path) -> pd.DataFrame:
         row = values.notna() & ~values.map(_fits)
         line = int(row.to_numpy().argmax())
         found = f"{column} is {values.iloc[line]!r:.80}"
-        raise ValueError(f"{file.name}, line {line + 2}: {found}, which is no number")
+        raise ValueError(f"{file.name}, line {line + 2}: {found}, which is not a number")
     return table

@@ -107,11 +107,11 @@ class _SkippedRunError(Exception):
 def _read(folder: Path) -> Run:
     file = folder / "result.json"
     if not file.exists():
-        raise _SkippedRunError("unfinished, there is no result.json yet")
+        raise _SkippedRunError("unfinished: there is no result.json yet")
     try:
         result = json.loads(file.read_text())
         if not isinstance(result, dict):
-            raise TypeError("it holds no object")
+            raise TypeError("it is not a JSON object")
         version = result["schema_version"]
         if version == SCHEMA_VERSION and not result["finished"]:
             raise _SkippedRunError("unfinished")
@@ -132,7 +132,7 @@ def _read(folder: Path) -> Run:
         if (folder / "steps.csv").exists():
             read_table(folder / "steps.csv")
         elif (folder / "chains.bin").exists():
-            raise ValueError("there is chains.bin, and no steps.csv beside it")
+            raise ValueError("there is a chains.bin but no steps.csv; restore it from a copy")
         for name in ("chains.bin", "target_map.bin"):
             read_records(folder / name)
     except ValueError as error:
@@ -175,6 +175,6 @@ def _require_equal(runs: Sequence[Run], what: str, value: Callable[[Run], str]) 
     for run in runs[1:]:
         if value(run) != value(first):
             raise ValueError(
-                f"runs of two {what} cannot be compared: {first.folder} has {value(first)}, "
-                f"{run.folder} has {value(run)}; report them from separate folders"
+                f"runs with different {what} cannot be compared: {first.folder} has "
+                f"{value(first)}, {run.folder} has {value(run)}; report them from separate folders"
             )

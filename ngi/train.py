@@ -61,7 +61,7 @@ def train(config: DictConfig) -> dict[str, Any]:
             stack.push(partial(_finish, tracker))
             heed_code_change(folder, on_change=config.run.on_code_change)
             if (result := folder.result) is not None:
-                log.info("%s is finished already; delete the folder to run it again", folder.path)
+                log.info("%s is already finished; to run it again, delete the folder", folder.path)
                 tracker.finished(folder=folder.path, settings=settings, label=result["label"])
                 return result
             if "path_tracing" in config:

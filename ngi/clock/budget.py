@@ -27,12 +27,12 @@ class Budget:
     ) -> None:
         if steps is None and seconds is None:
             raise ValueError(
-                "budget.steps and budget.seconds are both null, which would never end; give one"
+                "budget.steps and budget.seconds are both null, so the run would never end; set one"
             )
         if steps is not None and steps < 1:
-            raise ValueError(f"budget.steps: {steps} is no budget; expected at least 1 step")
+            raise ValueError(f"budget.steps: {steps}; expected at least 1 step")
         if seconds is not None and not (math.isfinite(seconds) and seconds > 0):
-            raise ValueError(f"budget.seconds: {seconds} is no budget; expected more than 0")
+            raise ValueError(f"budget.seconds: {seconds}; expected more than 0")
         if clock not in CLOCKS:
             raise ValueError(f"budget.clock: '{clock}'; expected one of {list(CLOCKS)}")
         if clock == "model" and costs is None:

@@ -44,7 +44,7 @@ NOT_AVERAGED = "ngi.models.no_average"
 SCALAR = "scalar_rgb"
 """Mitsuba's slow variant, as renderers describe themselves."""
 
-REMEDY = "measure it by the same command line with `ngi costs` for `ngi train`"
+REMEDY = "measure it with the same command line, but `ngi costs` instead of `ngi train`"
 
 
 @dataclass(frozen=True)
@@ -196,15 +196,15 @@ class CostFile:
                 about = component.settings.get("scene", component.settings.get("model", {}))
                 raise ValueError(
                     f"budget.costs: {self.path} lacks '{component.key}' ({about}), which "
-                    f"budget.clock=model counts with; {REMEDY}"
+                    f"budget.clock=model needs; {REMEDY}"
                 )
             found[component.name] = dict(entries[component.key]["seconds"])
             machine = entries[component.key].get("machine", {})
             machines[component.key] = f"{machine.get('cores')} cores of {machine.get('processor')}"
         if len(set(machines.values())) > 1:
             raise ValueError(
-                f"budget.costs: what a step costs in {self.path} was measured on different "
-                f"machines: {machines}; give another file, and {REMEDY}"
+                f"budget.costs: the costs in {self.path} were measured on different machines: "
+                f"{machines}; name a new file, and {REMEDY}"
             )
         return found
 

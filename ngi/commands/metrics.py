@@ -49,7 +49,7 @@ def check(options: MetricsOptions) -> int:
             frames = recomputed(file.parent, result, lpips=lpips)
             shown, found = table(result, frames), list(differences(result, frames))
         except UNREADABLE as error:
-            damaged = f"{file} is no result of this program ({type(error).__name__}: {error})"
+            damaged = f"{file} is not a result of this program ({type(error).__name__}: {error})"
             print(error if isinstance(error, ValueError) else damaged, file=sys.stderr)
             status = 2
             continue

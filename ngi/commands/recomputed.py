@@ -32,11 +32,11 @@ def recomputed(run: Path, result: Mapping[str, Any], *, lpips: Lpips) -> Frames:
     program measures by another protocol.
     """
     if "frames" not in result and "metrics" in result:
-        raise ValueError(f"{run} holds the network of a run and none of its pictures")
+        raise ValueError(f"{run} holds only the network of a run, without its pictures")
     if result.get("linear") is None:
         raise ValueError(
-            f"{run} has no linear pictures: run.linear_megabytes was too small, or the run is of "
-            "before they were kept"
+            f"{run} has no linear pictures: run.linear_megabytes was too small, or an older "
+            "version, which did not keep them, made the run"
         )
     protocol = _protocol(run, result)
     frames = []
@@ -63,8 +63,8 @@ def _protocol(run: Path, result: Mapping[str, Any]) -> EvaluationProtocol:
         if (known := protocol.identity) == told:
             return protocol
     raise ValueError(
-        f"{run} was measured by protocol {told}, which this program knows as {known}; use the "
-        f"version that made it ({result.get('commit')})"
+        f"{run} was measured with protocol {told}; in this version of the program the same "
+        f"settings give {known}; use the version that made the run ({result.get('commit')})"
     )
 
 

@@ -70,9 +70,9 @@ def build_network(config: DictConfig, *, samples: learn.Samples) -> nn.Module:
         return learn.network_of(samples, make)
     except TypeError as error:
         raise ValueError(
-            f"model: {error}; a network takes the keys of model, among them hidden_features and "
-            "hidden_layers, which budgets set, and of layout, scene_dimensions and moving what it "
-            "asks for"
+            f"model: {error}; a network's arguments are the keys of model (budgets set "
+            "hidden_features and hidden_layers) and, optionally, layout, scene_dimensions and "
+            "moving"
         ) from error
 
 
@@ -175,8 +175,8 @@ def run_components(config: DictConfig, *, renderer: Renderer) -> list[learn.Comp
     sampler = instantiate(config.sampler)
     if sampler.needs_description:
         raise ValueError(
-            "sampler: it looks at patches before they are traced, which the model clock does not "
-            "count; with budget.clock=wall, or with budget.steps, there is no need to"
+            "sampler: it inspects patches before they are traced, and budget.clock=model cannot "
+            "count that; choose budget.clock=wall, or limit the run by budget.steps"
         )
     return learn.components(
         plain(config),

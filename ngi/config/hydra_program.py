@@ -95,17 +95,17 @@ def in_order(words: Sequence[str]) -> list[str]:
     multirun = [word for word in words if word in MULTIRUN]
     sweep = next((word for word in words if word.startswith("+sweeps=")), None)
     if sweep and not multirun and not any(word.partition("=")[0] in SHOWING for word in words):
-        sys.exit(f"{sweep}: a sweep is several runs, give -m; with --dry-run they are only listed")
+        sys.exit(f"{sweep}: a sweep needs -m, as it has several runs; --dry-run only lists them")
     ordered = [*multirun[:1], *(word for word in words if word not in MULTIRUN)]
     unknown = get_args_parser().parse_known_args(ordered)[1]
     if unknown and unknown[0].startswith("-"):
         name, _, value = unknown[0].lstrip("-").partition("=")
         sys.exit(
-            f"{unknown[0]}: there is no such option; what a run is made of is given without "
-            f"dashes, as {name}={value or '…'} (--help lists it)"
+            f"{unknown[0]}: there is no such option; settings of a run are written without dashes: "
+            f"{name}={value or '…'} (--help lists them)"
         )
     if unknown:
-        sys.exit(f"{unknown[0]}: options have to come before all words like this one")
+        sys.exit(f"{unknown[0]}: put options, such as -m, before all words without dashes")
     return ordered
 
 
@@ -126,9 +126,8 @@ MESSAGES = (*TOLD, InstantiationException)
 """Exceptions whose text says to users what is wrong; all others are bugs."""
 
 WITH_LESS_MEMORY = (
-    "the graphics card has no room for this: free it (`nvidia-smi` says what holds it), or lower "
-    "sampler.chains, model.hidden_features or renderer.workers; the same command goes on from the "
-    "last checkpoint"
+    "the GPU is out of memory: free some (`nvidia-smi` lists its users), or lower sampler.chains, "
+    "model.hidden_features or renderer.workers; the same command resumes from the last checkpoint"
 )
 
 KILLED = ("UncompletedJobError", "TerminatedWorkerError")
@@ -162,11 +161,11 @@ def run_program(program: Callable[[], None], *, folder_option: str = "run.folder
         sys.exit(explained(error))
     except (OSError, ValueError) as error:  # where Hydra makes the folder, or its log in there
         if str(error).startswith("Only one of --run"):
-            sys.exit(f"{error}; the settings of one run of a sweep: without -m, --cfg job")
+            sys.exit(f"{error}; to see the settings of one run of a sweep, leave out -m: --cfg job")
         cause = error if isinstance(error, OSError) else error.__cause__
         if not isinstance(cause, OSError):
             raise
-        advice = f"choose another folder with {folder_option}=…, or see to its permissions"
+        advice = f"choose another folder with {folder_option}=…, or change its permissions"
         sys.exit(f"{cause}; {advice}")
     except RuntimeError as error:
         if type(error).__name__ not in KILLED:
@@ -224,7 +223,7 @@ def explained(error: Exception) -> str:
         group = "scene" if group.startswith("scene/") else group  # a path, not a name
         where = _about_scenes(option) if group == "scene" else ""
         if option in LAUNCHERS:
-            where = f"; {install_command(LAUNCHERS[option])} brings it"
+            where = f"; install it with {install_command(LAUNCHERS[option])}"
         return (
             f"{error.missing_cfg_file}: there is no such option; "
             f"{group} can be {', '.join(error.options)}{where}{_question(near)}"
@@ -253,7 +252,7 @@ def _about_scenes(name: str) -> str:
 
 def _about_word(error: OverrideParseException) -> str:
     if "=" not in error.override:
-        return f"'{error.override}': give key=value, without blanks around the ="
+        return f"'{error.override}': write key=value, without spaces around the ="
     problem = error.message.removeprefix(f"Error parsing override '{error.override}'").strip()
     return f"'{error.override}': {problem}"
 
@@ -265,7 +264,7 @@ def _about_key(error: OmegaConfBaseException) -> str:
     known = list(_keys(OmegaConf.to_container(parent))) if isinstance(parent, DictConfig) else []
     known += () if above else sorted(config_groups() - set(known))
     near = get_close_matches(key, known, n=1) or [k for k in known if k.endswith(f".{key}")]
-    swept = f"; where all options of a sweep have it: ++{full_key}=…" * _sweeps()
+    swept = f"; if all options of the sweep have this key: ++{full_key}=…" * _sweeps()
     if near:
         return f"{full_key}: there is no such key{_question([above + near[0]])}{swept}"
     there = ", ".join(above + k for k in known if "." not in k) or "none"

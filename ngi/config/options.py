@@ -75,7 +75,7 @@ def check_output(out: Path, *suffixes: str) -> None:
     if out.suffix not in suffixes:
         raise ValueError(f"out: '{out}' does not end with {' or '.join(suffixes)}")
     if not out.parent.is_dir():
-        raise ValueError(f"out: there is no folder {out.parent}")
+        raise ValueError(f"out: the folder {out.parent} does not exist")
 
 
 def run_tool(

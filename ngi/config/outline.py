@@ -47,9 +47,9 @@ def only_bootstrap(config: Mapping[str, Any], *, steps: int, generated_batches: 
     if not steps == generated_batches < bootstrap:
         return None
     return (
-        f"each of the {steps} steps waited for new patches, as reuse.policy.bootstrap_batches="
-        f"{bootstrap} asks for: give the run more time, lower that number, or name neither budget "
-        "nor method, and both follow from budget.seconds and this machine"
+        f"each of the {steps} steps waited for new patches, because reuse.policy.bootstrap_batches="
+        f"{bootstrap} comes before any reuse: give the run more time, lower that number, or name "
+        "neither budget nor method, so that both follow from budget.seconds and this machine"
     )
 
 

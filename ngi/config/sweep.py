@@ -146,7 +146,7 @@ def _show_and_exit(plan: Callable[[], Sequence[Planned]]) -> NoReturn:
     try:
         runs = plan()
         if not runs:
-            sys.exit("--dry-run: this sweeper chooses its runs as it goes; there is no plan")
+            sys.exit("--dry-run: this sweeper chooses each run as it goes; there is no plan")
         with readers_may_leave():
             print(table(runs))
     except NOT_COMPOSED as error:

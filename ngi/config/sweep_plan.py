@@ -93,7 +93,7 @@ def _apart(runs: Sequence[Planned]) -> list[Planned]:
     found = []
     for run in runs:
         if run.runs and first.setdefault(run.folder, run.settings) != run.settings:
-            state = "cannot start: an earlier run of this sweep has its folder; see run.folder"
+            state = "cannot start: an earlier run of this sweep uses its folder; see run.folder"
             run = replace(run, state=state, done=0.0, left=None)
         found.append(run)
     return found
@@ -130,7 +130,7 @@ def planned_run(config: DictConfig, costs: dict[str, float | None]) -> Planned:
 def _check_measured(budget: Budget) -> None:
     """ValueError where the model clock has nothing at all to count with."""
     if budget.clock == "model" and not Path(str(budget.costs)).exists():
-        raise ValueError(f"budget.costs: {budget.costs} is not there; {REMEDY}")
+        raise ValueError(f"budget.costs: {budget.costs} does not exist; {REMEDY}")
 
 
 @cache
@@ -147,7 +147,7 @@ def _state(config: DictConfig, folder: Path) -> str:
     there = kept_settings(folder)
     is_longer = there is not None and _is_longer(config, there, folder)
     if is_longer and not any((folder / name).exists() for name in CHECKPOINTS):
-        raise ValueError("it can not be trained longer: there is no checkpoint in its folder")
+        raise ValueError("it cannot be trained longer: there is no checkpoint in its folder")
     made = made_with(folder, last_step=RowLog(folder / STEPS).last_step)
     if made is not None and not same_program(made, code_version(there)):
         if config.run.on_code_change == "restart":
@@ -164,7 +164,7 @@ def _is_longer(config: DictConfig, there: Any, folder: Path) -> bool:
     try:
         known = {"scene_hash": there["scene"]["hash"], "costs": there["costs"]}
     except (KeyError, TypeError):
-        raise ValueError(f"{folder / SETTINGS} is no run's; delete the folder") from None
+        raise ValueError(f"{folder / SETTINGS} is not of a run; delete the folder") from None
     ours = run_settings(config, **known)
     is_longer = longer(ours, than=there)
     if ours != there and not is_longer:
@@ -219,7 +219,7 @@ def table(runs: Sequence[Planned]) -> str:
         [shown(run.folder), run.state, f"{run.done:.0%}", duration(run.left), run.choices]
         for run in runs
     ]
-    headers = ["run", "state", "done", "training left", "of this sweep's choices"]
+    headers = ["run", "state", "done", "training left", "what this sweep sets"]
     states = Counter(run.state.split(":")[0] for run in runs)
     total = [f"{count} {state}" for state, count in states.items()]
     to_do = [run for run in runs if run.runs]
@@ -229,7 +229,7 @@ def table(runs: Sequence[Planned]) -> str:
         summary += f"; about {duration(sum(known))} of training left"
     if len(known) < len(to_do):
         what = "they take" if not known else f"{len(to_do) - len(known)} of them take"
-        summary += f"; how long {what} is not known, `ngi costs` with the same words measures it"
+        summary += f"; how long {what} is unknown, `ngi costs` with the same arguments measures it"
     return f"{tabulate(rows, headers)}\n\n{summary}; evaluations and references come on top"
 
 

@@ -112,7 +112,7 @@ def _target(name: str, key: str) -> Callable[..., Any]:
     try:
         target: Callable[..., Any] = resolve_name(name)
     except (ImportError, AttributeError) as error:
-        where = "; PYTHONPATH=. finds modules here" if isinstance(error, ImportError) else ""
+        where = "; PYTHONPATH=. adds this folder" if isinstance(error, ImportError) else ""
         raise ValueError(f"{key}: '{name}' cannot be imported: {error}{where}") from error
     return target
 

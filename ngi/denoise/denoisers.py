@@ -44,7 +44,7 @@ class OpenImageDenoise:
             import pyoidn
         except ModuleNotFoundError as error:
             raise RuntimeError(
-                f"Open Image Denoise is asked for, and needs {error.name}: "
+                f"this configuration uses Open Image Denoise, which needs {error.name}: "
                 f"{install_command('denoise')}"
             ) from error
         # Where several runs share a machine, OMP_NUM_THREADS says which part of it each may take.

@@ -119,8 +119,8 @@ class Evaluator:
         above = [noise for noise in noises if noise > self.protocol.target_noise]
         if above:
             log.info(
-                "%d of %d references stayed above %.1f %% noise at %d samples per pixel, the worst "
-                "at %.1f %%",
+                "%d of %d references still have more than %.1f %% noise at %d samples per pixel; "
+                "the worst has %.1f %%",
                 len(above),
                 len(noises),
                 100 * self.protocol.target_noise,

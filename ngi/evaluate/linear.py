@@ -35,8 +35,8 @@ def write_linear(folder: Path, pictures: Pictures, *, megabytes: float) -> str |
     kept = next((name for name, size in FORMATS.items() if numbers * size <= 1e6 * megabytes), None)
     if kept is None:
         log.warning(
-            "%s: linear pictures would take %.0f MB as half floats, and run.linear_megabytes is "
-            "%g: none are kept, and `ngi metrics` cannot check this run later",
+            "%s: linear pictures would take %.0f MB as half floats, more than run.linear_megabytes="
+            "%g: none are kept, so `ngi metrics` cannot check this run later",
             folder.parent,
             1e-6 * numbers * FORMATS["half"],
             megabytes,
@@ -63,7 +63,7 @@ def read_linear(folder: Path, set_name: str, index: int) -> tuple[Tensor, Tensor
     prediction, reference = map(read_exr, files)
     if prediction.shape != reference.shape:
         sizes = " and ".join(f"{x.shape[1]} x {x.shape[0]}" for x in (prediction, reference))
-        raise DamagedError(f"{files[0]} and its reference are of {sizes} pixels")
+        raise DamagedError(f"{files[0]} and its reference have different sizes, {sizes} pixels")
     return prediction, reference
 
 

@@ -60,8 +60,8 @@ def cached_weights() -> Path:
 
 def _how_to_get_weights(path: Path) -> str:
     return (
-        "no AlexNet weights for LPIPS: `python -m ngi.evaluate.lpips_download` gets them into "
-        f"{path}, or name a copy by NGI_LPIPS_WEIGHTS=FILE"
+        "no AlexNet weights for LPIPS: `python -m ngi.evaluate.lpips_download` downloads them to "
+        f"{path}; or set NGI_LPIPS_WEIGHTS to a copy"
     )
 
 

@@ -39,8 +39,8 @@ class Importance:
             raise ValueError(f"largest_ratio: {self.largest_ratio}: give a number of at least 1")
         if self.weighted and self.uniform_share == 0:
             raise ValueError(
-                "uniform_share: 0 with weighted: true: the weights would have no bound; give a "
-                "share above 0, weights scatter up to about its inverse"
+                "uniform_share: 0 with weighted: true: the weights would be unbounded; give a "
+                "share above 0, whose inverse roughly bounds the weights"
             )
 
     def probabilities(self, values: Tensor) -> Tensor:
@@ -88,7 +88,7 @@ class Importance:
         value, the rest is drawn from the others.
         """
         if count > len(values):
-            raise ValueError(f"count: {count} of {len(values)} candidates: there are not so many")
+            raise ValueError(f"count: {count}: there are only {len(values)} candidates")
         probabilities = self.probabilities(values)
         # The largest of p_i / Exponential(1) are drawn without replacement (Efraimidis 2006).
         clocks = torch.empty_like(probabilities).exponential_(generator=generator)

@@ -107,7 +107,7 @@ class PredictedLoss:
             raise ValueError(
                 f"sampler.memory: {self._forest['trees']} trees of {self._memory} states with "
                 f"{state_dimensions} variables take several times {4e-9 * numbers:.1f} GB of "
-                "memory; give less of sampler.memory or sampler.trees, or choose sampler=sobol"
+                "memory; lower sampler.memory or sampler.trees, or choose sampler=sobol"
             )
         forest = Forest.flat(trees=self._forest["trees"], depth=self._forest["depth"])
         return PredictedState.empty(

@@ -66,14 +66,14 @@ class PredictedFromBuffers(PredictedLoss):
         if candidates % of_one_vector or candidates < least:
             raise ValueError(
                 f"sampler.candidates: {candidates}: give a multiple of {of_one_vector} and "
-                f"at least {least}: so many are of one scene vector, of which one is chosen"
+                f"at least {least}: {of_one_vector} candidates share a scene vector"
             )
         if importance.weighted:
-            raise ValueError("sampler.importance.weighted: true: weights are not known; give false")
+            raise ValueError("sampler.importance.weighted: true: no weights here; give false")
         if not 2 * chains <= uniform_first <= memory:
             raise ValueError(
-                f"sampler.uniform_first: {uniform_first}: give at least {2 * chains}, and no more "
-                f"than are remembered (sampler.memory: {memory})"
+                f"sampler.uniform_first: {uniform_first}: give at least {2 * chains}, and at most "
+                f"sampler.memory, which is {memory}"
             )
         self._vectors = candidates // of_one_vector
         self._seen_together = 2 * chains

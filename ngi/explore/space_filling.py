@@ -39,7 +39,7 @@ class SobolSequence:
         if dimensions > SobolEngine.MAXDIM:
             raise ValueError(
                 f"sampler: {dimensions} dimensions (the scene's variables and the patch position): "
-                f"a Sobol sequence is known for at most {SobolEngine.MAXDIM}; choose "
+                f"Sobol sequences exist for at most {SobolEngine.MAXDIM}; choose "
                 "sampler=latin_hypercube"
             )
         if self._engine is None or self._engine.dimension != dimensions:
@@ -98,8 +98,8 @@ class SobolQuarters(Sobol):
         vectors, rest = divmod(patches, len(QUARTERS))
         if rest:
             raise ValueError(
-                f"sampler.chains: {patches}: give a multiple of {len(QUARTERS)}: so many patches "
-                "are of one scene vector"
+                f"sampler.chains: {patches}: give a multiple of {len(QUARTERS)}, the number of "
+                "patches that share a scene vector"
             )
         return _large_steps(self._sequence.quarters(batch * vectors, vectors, dimensions), position)
 

@@ -48,7 +48,7 @@ def code_versions(folder: Path) -> list[dict[str, Any]]:
     path = folder / FILE
     if not path.exists():
         return []
-    with damage_named(path, "delete it, and the run goes on"):
+    with damage_named(path, "delete it, and the run resumes"):
         found: list[dict[str, Any]] = json.loads(path.read_text())
         _ = [[entry[key] for key in ("commit", "dirty", "code", "after_step")] for entry in found]
     return found
@@ -67,8 +67,8 @@ def record_code_version(folder: Path, *, after_step: int, settings: Any = None) 
         return
     if kept:
         log.warning(
-            "%s: goes on with %s; up to step %d it was made with %s. If what is computed has "
-            "changed in between, run.on_code_change=restart begins it afresh",
+            "%s: resumes with %s; up to step %d it was made with %s. If the computation has "
+            "changed in between, run.on_code_change=restart begins again",
             folder,
             shown(version),
             after_step,

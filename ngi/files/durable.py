@@ -34,12 +34,12 @@ def full_disk_named(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        advice = "Make room on the disk (or see to its permissions)"
+        advice = "Free disk space (or change the folder's permissions)"
         if isinstance(error, FileNotFoundError):  # what was written is gone already
-            advice = "Another process may write it, too: let one of them go on alone"
+            advice = "Another process may be writing it too: stop all but one of them"
         raise OSError(
             error.errno,
-            f"{error.strerror}: this file could not be written, earlier checkpoints are intact. "
+            f"{error.strerror}: this file could not be written; earlier checkpoints are intact. "
             f"{advice}, then start the same command again",
             str(path),
         ) from error

@@ -115,8 +115,8 @@ class RecordLog(GrowingFile[BinaryIO]):
         if not line.endswith(b"\n"):
             return None
         advice = (
-            "its first line says what it holds; put back a copy, or delete it and the same command "
-            "begins a new one at the last checkpoint"
+            "its first line describes the records; restore it from a copy, or delete it and the "
+            "same command begins a new one at the last checkpoint"
         )
         with damage_named(self.path, advice):
             return np.dtype([(n, t, tuple(shape)) for n, t, shape in json.loads(line)["fields"]])

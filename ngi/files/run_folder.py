@@ -143,8 +143,8 @@ class RunFolder:
         except OSError as error:
             raise OSError(
                 error.errno,
-                f"{error.strerror}: this run's folder can not be written to; choose another one "
-                "with run.folder=…, or see to its permissions",
+                f"{error.strerror}: this run's folder is not writable; choose another one with "
+                "run.folder=…, or change its permissions",
                 str(self.path),
             ) from error
         try:
@@ -158,8 +158,8 @@ class RunFolder:
             lock.close()
             raise OSError(
                 error.errno,
-                f"{error.strerror}: this disk can not lock files, without which two processes "
-                "could train one run; choose a folder on another disk with run.folder=…",
+                f"{error.strerror}: this disk cannot lock files, so two processes might train one "
+                "run at the same time; choose a folder on another disk with run.folder=…",
                 str(self.path),
             ) from error
         return lock
@@ -187,7 +187,7 @@ class RunFolder:
             raise ValueError(
                 f"{self.path} holds another run ({'; '.join(different[:3])}"
                 f"{'; …' if len(different) > 3 else ''}); choose another folder with run.folder=…, "
-                "or delete that one"
+                "or delete that run"
             )
         self.settings = earlier
 

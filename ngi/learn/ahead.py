@@ -46,7 +46,7 @@ class ProposalsAhead:
     def result(self) -> RenderedPatches:
         """What was rendered, waited for. Raises RuntimeError before `start`."""
         if self.job is None:
-            raise RuntimeError("patches that nobody renders are waited for; call start() first")
+            raise RuntimeError("these patches are not being rendered yet; call start() first")
         return self.job.result()
 
     def patches(self) -> Patches:

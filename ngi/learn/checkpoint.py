@@ -73,8 +73,8 @@ def prepare_resume(folder: RunFolder) -> Path | None:
     checkpoint = _newest_usable(folder)
     if checkpoint is None and folder.lengthened:
         raise ValueError(
-            f"{folder.path} can not be trained longer: there is no checkpoint in it; put "
-            f"{folder.checkpoint.name} back, or {OTHER_FOLDER}"
+            f"{folder.path} cannot be trained longer: there is no checkpoint in it; restore "
+            f"{folder.checkpoint.name} from a copy, or {OTHER_FOLDER}"
         )
     if checkpoint is None:
         folder.forget_logs()
@@ -85,8 +85,8 @@ def prepare_resume(folder: RunFolder) -> Path | None:
     step = checkpoint["global_step"]
     dropped = {log_file: log_file.keep_until(step) for log_file in folder.logs}
     log.info(
-        "%s: going on from step %d, the last that was saved; later ones are done again (%d are in "
-        "steps.csv, a killed run may have done more)",
+        "%s: resuming from step %d, the last one saved; later steps are repeated (%d are in "
+        "steps.csv; a killed run may have done more)",
         folder.path,
         step,
         dropped[folder.steps],
@@ -106,23 +106,23 @@ def _newest_usable(folder: RunFolder) -> dict[str, Any] | None:
             problems.append(str(error))
             continue
         for problem in problems:
-            log.warning("%s; the checkpoint before it is used", problem)
+            log.warning("%s; using the previous checkpoint", problem)
         os.replace(path, folder.checkpoint)
         return checkpoint
     if problems:
         afresh = (
-            f"delete every checkpoint (*.ckpt) in {folder.path} and the same command starts the "
-            "run afresh"
+            f"delete every checkpoint (*.ckpt) in {folder.path}, and the same command starts the "
+            "run again from step 0"
         )
         remedy = OTHER_FOLDER if folder.lengthened else afresh
-        raise ValueError(f"{'; '.join(problems)}; put back a copy, or {remedy}")
+        raise ValueError(f"{'; '.join(problems)}; restore a copy, or {remedy}")
     return None
 
 
 def _before_decay(folder: RunFolder, newest: dict[str, Any]) -> dict[str, Any]:
     """What `folder.checkpoint` holds once a longer run can go on from it."""
     step = newest["callbacks"]["BudgetAndCheckpoint"][DECAYS_FROM]
-    log.info("%s is trained longer; what it had as its result is made again", folder.path)
+    log.info("%s is trained longer; its result will be replaced", folder.path)
     if step is None:
         return newest
     if step == newest["global_step"]:  # as a start leaves it that is killed below
@@ -130,8 +130,8 @@ def _before_decay(folder: RunFolder, newest: dict[str, Any]) -> dict[str, Any]:
         return newest
     if step == 0:
         raise ValueError(
-            f"{folder.path} can not be trained longer: its learning rate decays from the first "
-            f"step on (schedule.decay_share: 1), so that no step is that of a longer run; "
+            f"{folder.path} cannot be trained longer: its learning rate decays from the first "
+            "step on (schedule.decay_share: 1), so a longer run differs in every step; "
             f"{OTHER_FOLDER}"
         )
     path = folder.stable_checkpoint
@@ -139,8 +139,8 @@ def _before_decay(folder: RunFolder, newest: dict[str, Any]) -> dict[str, Any]:
         stable = _read(path, folder)
     except (OSError, DamagedError) as error:
         raise ValueError(
-            f"{folder.path} can not be trained longer: its learning rate has decayed since step "
-            f"{step}, and the checkpoint of that step can not be used ({error}); "
+            f"{folder.path} cannot be trained longer: its learning rate has decayed since step "
+            f"{step}, and the checkpoint of that step is unusable ({error}); "
             f"{OTHER_FOLDER}"
         ) from error
     folder.forget_result()
@@ -164,13 +164,13 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
     content = memoryview(path.read_bytes())
     content, checksum = content[:-CHECKSUM_BYTES], content[-CHECKSUM_BYTES:]
     if hashlib.sha256(content).digest() != checksum:
-        raise DamagedError(f"{path} is damaged (its checksum is not that of its content)")
+        raise DamagedError(f"{path} is damaged (its checksum does not match its content)")
     try:
         checkpoint: dict[str, Any] = torch.load(
             io.BytesIO(content), map_location="cpu", weights_only=True
         )
     except Exception as error:  # torch.load raises nearly anything; its advice is to execute code
-        raise DamagedError(f"{path} can not be read ({type(error).__name__})") from error
+        raise DamagedError(f"{path} cannot be read ({type(error).__name__})") from error
     return checkpoint
 
 

@@ -27,14 +27,14 @@ def heed_code_change(folder: RunFolder, *, on_change: str) -> None:
     now = code_versions.code_version(folder.settings)
     if made is None or same_program(made, now):
         return
-    change = f"{folder.path} was made with {shown(made)}, and this is {shown(now)}"
+    change = f"{folder.path} was made with {shown(made)}; this program is {shown(now)}"
     if on_change == "refuse":
         raise RuntimeError(
-            f"{change}; run.on_code_change=continue keeps what is there, run.on_code_change="
-            "restart deletes it and begins afresh, run.folder=… chooses another folder"
+            f"{change}; run.on_code_change=continue keeps the run, run.on_code_change=restart "
+            "deletes it and begins again, run.folder=… chooses another folder"
         )
     if on_change == "restart":
-        log.warning("%s: it begins afresh, and what is there is deleted", change)
+        log.warning("%s: the run is deleted and begins again", change)
         folder.restarted = True
     elif folder.result is not None:
-        log.warning("%s: run.on_code_change=restart makes it again", change)
+        log.warning("%s: to repeat the run, set run.on_code_change=restart", change)

@@ -49,7 +49,7 @@ class Interruption:
             signal.signal(number, handler)
         if isinstance(exception, Interrupted):
             log.warning(
-                "%s: ended by %s; the same command goes on", self._of, exception.number.name
+                "%s: ended by %s; to resume, repeat the command", self._of, exception.number.name
             )
 
     @contextmanager

@@ -158,8 +158,8 @@ class IlluminationModule(LightningModule):
         """Whose answers are to be compared. Raises ValueError where no weights are averaged."""
         if self.averaged is None:
             raise ValueError(
-                "averaging: what present and averaged weights disagree on is asked for, and none "
-                "are averaged; give averaging=exponential"
+                "averaging: the sampler compares current with averaged weights, but no weights are "
+                "averaged; give averaging=exponential"
             )
         return self.averaged.module
 
@@ -198,7 +198,7 @@ class IlluminationModule(LightningModule):
         if not hasattr(self.network, "render"):
             raise ValueError(
                 f"model: {type(self.network).__name__} has no method render(buffers, scene_vector)"
-                ", which makes the whole images that are evaluated and shown"
+                ", which evaluation and viewer need for whole images"
             )
         inputs, _ = self._example(patches)
         takes = signature(self.network.forward)
@@ -207,8 +207,8 @@ class IlluminationModule(LightningModule):
         except TypeError as error:
             raise ValueError(
                 f"model and data do not fit: {type(self.network).__name__} takes "
-                f"{list(takes.parameters)}, the samples give {len(inputs)} tensors; a method, "
-                "method=uniform or method=cnsr, chooses both"
+                f"{list(takes.parameters)}, but a sample has {len(inputs)} input tensors; choose a "
+                "method, such as method=uniform or method=cnsr, which sets both"
             ) from error
 
     def _scorer_of(self, target: Target) -> Scorer:

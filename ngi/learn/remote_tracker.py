@@ -49,7 +49,7 @@ class Aside:
             self._calls.put_nowait(function)
         except Full:
             if self.dropped == 0:
-                self._warn(f"takes no more calls, {CAPACITY} of them wait")
+                self._warn(f"takes no more calls: {CAPACITY} are waiting already")
             self.dropped += 1
 
     def end(self, *last: Callable[[], None], seconds: float) -> None:
@@ -63,7 +63,7 @@ class Aside:
         else:
             self._ended.wait(max(0.0, deadline - monotonic()))
         if not self._ended.is_set():
-            self._warn(f"has not ended after {seconds:g} s and is left behind")
+            self._warn(f"has not finished after {seconds:g} s; the run ends without it")
         if self.dropped:
             self._warn(f"has lost {self.dropped} calls")
 
@@ -122,7 +122,7 @@ class Remote(Tracker):
             self._better(row)
         self._aside = Aside(
             self.name,
-            consequence=f"rows are missing there, but all are in the files of {folder}",
+            consequence=f"it lacks some rows; all of them are in the files of {folder}",
         )
         self._call(lambda: self._begin(folder, settings, label))
 

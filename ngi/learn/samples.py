@@ -63,8 +63,8 @@ class Samples(Protocol):
         patches.
         """
         raise ValueError(
-            f"sampler: it looks at patches before they are traced, and {type(self).__name__} makes "
-            "samples of another kind; choose another sampler, for example sampler=uniform"
+            f"sampler: it inspects patches before they are traced, but {type(self).__name__} does "
+            "not make patches; choose another sampler, for example sampler=uniform"
         )
 
     def rearranged(self, patches: Patches, generator: torch.Generator) -> Patches:  # noqa: ARG002

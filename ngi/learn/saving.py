@@ -40,7 +40,7 @@ class BudgetAndCheckpoint(Callback):
             raise ValueError(f"run.checkpoint_seconds: {every_seconds}: give at least 0")
         if every_steps is not None and every_steps < 1:
             raise ValueError(
-                f"run.checkpoint_steps: {every_steps}: give at least 1, or null for seconds alone"
+                f"run.checkpoint_steps: {every_steps}: give at least 1, or null for seconds only"
             )
         self._run = run
         self._every_seconds = every_seconds
@@ -99,7 +99,7 @@ class BudgetAndCheckpoint(Callback):
         if isinstance(exception, Interrupted | SIGTERMException):  # between two steps
             if self._saved_step < step:
                 self._save(trainer)
-            log.warning("%s: interrupted, and saved at step %d", self._run.folder.path, step)
+            log.warning("%s: interrupted; saved at step %d", self._run.folder.path, step)
 
     def _save(self, trainer: Trainer) -> None:
         self._run.stream.settle()
@@ -131,7 +131,7 @@ class BudgetAndCheckpoint(Callback):
             try:
                 self._run.stream.saved_stores.keep(read_checkpoint(stable)[STREAM]["store"])
             except DamagedError as error:
-                log.warning("%s; this run can not be trained longer later on", error)
+                log.warning("%s; without it this run cannot be trained longer later", error)
 
     def _keep_stable(self) -> None:
         with self._run.clock.phase("checkpoint"):

@@ -80,6 +80,6 @@ class WarmupStableDecay(Schedule):
         if budget.steps is not None and self._warmup_steps >= budget.steps:
             raise ValueError(
                 f"schedule.warmup_steps: {self._warmup_steps} steps of warm-up do not fit into "
-                f"budget.steps: {budget.steps}; raise that, or set "
+                f"budget.steps: {budget.steps}; raise budget.steps, or set "
                 f"schedule.warmup_steps={budget.steps // 4}"
             )

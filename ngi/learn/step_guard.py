@@ -167,14 +167,14 @@ class StepGuard:
         self._in_a_row += 1
         self._stream.counters.steps_refused += 1
         step = attempt.number
-        log.warning("step %d is not taken: %s", step, cause)
+        log.warning("step %d is skipped: %s", step, cause)
         if self._in_a_row < REFUSED_IN_A_ROW:
             return
         write_tensors(self._report, {"cause": cause, "step": step, **attempt.content()})
         raise FloatingPointError(
-            f"step {step} is the {REFUSED_IN_A_ROW}th in a row that is not taken: {cause}. "
-            f"Weights, moments and batch are in {self._report}. The usual remedy is a lower "
-            "optimizer.lr, in a new folder, since that is another run"
+            f"step {step} is the {REFUSED_IN_A_ROW}th skipped in a row: {cause}. {self._report} "
+            "has the weights, moments and batch. The usual remedy is a lower optimizer.lr, in a "
+            "new folder, since that makes it another run"
         )
 
 
@@ -188,12 +188,12 @@ def _cause(attempt: Attempt) -> str:
             f"is {losses[broken].tolist()}"
         )
     if not math.isfinite(attempt.largest_moment):
-        return "the optimiser's moments hold NaN or Inf, which no gradient brought there"
+        return "the optimiser's moments hold NaN or Inf, although no gradient did"
     named = attempt.network.named_parameters(prefix="network")
     unusable = [name for name, parameter in named if not _usable(parameter.grad)]
     return (
-        f"the gradient has the norm {norm:.3g}, from "
-        f"{', '.join(unusable[:3]) or 'all weights together'} on, at losses up to "
+        f"the gradient has norm {norm:.3g}, because of "
+        f"{', '.join(unusable[:3]) or 'all weights together'}, at losses up to "
         f"{losses.max().item():.3g}"
     )
 

@@ -268,13 +268,13 @@ class TrainingStream:
             if problem is None:
                 return ahead
             self.counters.batches_refused += 1
-            log.warning("%s; other patches are rendered instead", problem)
+            log.warning("%s; rendering other patches instead", problem)
             self.settle()  # others are proposed by weights that might be taken back later
             self._ahead = None
             ahead = self._propose()
         raise FloatingPointError(
-            f"{problem}, and in {REFUSED_IN_A_ROW - 1} batches before: the renderer gives no "
-            "usable patches of this scene"
+            f"{problem}, and in the {REFUSED_IN_A_ROW - 1} batches before: the renderer cannot "
+            "make usable patches of this scene"
         )
 
     def _accept(self, batch: Batch, feedback: Feedback) -> None:

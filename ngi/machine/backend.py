@@ -171,7 +171,7 @@ def cuda_problem() -> str | None:
 def _say_what_would_be_faster() -> None:
     """Logged once per process."""
     _logger.warning(
-        "rendering with the scalar backend; the LLVM backend would be about 3 times faster, "
-        "get it with `%s`",
+        "rendering with the scalar backend; the LLVM backend would be about 3 times faster; "
+        "install it with `%s`",
         INSTALL_COMMAND,
     )

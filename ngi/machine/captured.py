@@ -67,7 +67,9 @@ class Captured:
         self._gives_up, self._graphs = True, {}
         why = str(error).strip().splitlines() or [type(error).__name__]
         log.warning(
-            "%s: not recorded as a CUDA graph, launched kernel by kernel: %s", self._name, why[0]
+            "%s: not recorded as a CUDA graph, kernels are launched one by one: %s",
+            self._name,
+            why[0],
         )
 
 

@@ -71,7 +71,7 @@ class EnergyMeter:
         try:
             return [counter.read() for counter in self._counters]
         except OSError as error:
-            log.warning("energy is unknown from here on: %s", error)
+            log.warning("energy is no longer recorded: %s", error)
             self._counters, self._joules = [], None
             return None
 

@@ -66,6 +66,6 @@ def _check_stream(array: Any) -> None:
     kind, index = array.__dlpack_device__()
     if kind == DLDeviceType.kDLCUDA and torch.cuda.current_stream(index).cuda_stream != LEGACY:
         raise RuntimeError(
-            "Dr.Jit's arrays are handed over in CUDA's legacy default stream, and PyTorch is in "
-            "another one: leave torch.cuda.stream() for rendering"
+            "Dr.Jit hands over arrays in CUDA's legacy default stream, but PyTorch uses another: "
+            "render outside of torch.cuda.stream()"
         )

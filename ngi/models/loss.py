@@ -69,13 +69,13 @@ class L1Dssim:
             if getattr(self, name) < 0:
                 raise ValueError(f"loss.{name} is {getattr(self, name)}: it cannot be negative")
         if self.l1_weight == self.dssim_weight == self.relative_weight == 0:
-            raise ValueError("all weights of the loss are 0 (loss.l1_weight): nothing is learned")
+            raise ValueError("all weights of the loss are 0; raise loss.l1_weight")
         if self.window_size < 1 or self.window_size % 2 == 0:
             raise ValueError(f"loss.window_size is {self.window_size}: it must be odd and positive")
         if self.mirrored and self.release_layout:
             raise ValueError(
-                "loss.mirrored: true: the release has zeros around a patch (loss.release_layout: "
-                "true); choose one of both"
+                "loss.mirrored and loss.release_layout are both true, but the release pads patches "
+                "with zeros; set one of them to false"
             )
         for name in ("sigma", "k1", "k2", "data_range"):
             if getattr(self, name) <= 0:
@@ -83,7 +83,7 @@ class L1Dssim:
         if self.relative_offset < LEAST_OFFSET:
             raise ValueError(
                 f"loss.relative_offset is {self.relative_offset}: it must be {LEAST_OFFSET} or "
-                "more, or single precision does not tell black from less"
+                "more: single precision cannot resolve smaller numbers"
             )
 
     def __call__(self, prediction: Tensor, target: Tensor) -> Tensor:

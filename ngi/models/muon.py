@@ -54,7 +54,7 @@ class MuonAdam(torch.optim.Optimizer):
     ) -> None:
         for name, rate in (("lr", lr), ("adam_lr", adam_lr)):
             if not rate >= 0:
-                raise ValueError(f"optimizer.{name}: {rate} is no learning rate")
+                raise ValueError(f"optimizer.{name}: {rate}; expected at least 0")
         if not 0 <= momentum < 1:
             raise ValueError(f"optimizer.momentum: {momentum}; expected at least 0, below 1")
         if not clip_norm > 0:

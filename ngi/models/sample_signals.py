@@ -91,15 +91,13 @@ def step_norms_in_backward(
     parts = _watched_parts(model)
     rules = StepRules(optimizer)
     if not all(parameter in rules for parameter in model.parameters()):
-        raise ValueError(
-            "the optimizer does not hold every parameter of the model it is asked about"
-        )
+        raise ValueError("the optimizer does not hold every parameter of the model")
     squared_norms: dict[Tensor, Tensor] = {}
 
     def add_squared_norms(parameter: Tensor, gradients: Tensor) -> None:
         with around(), torch.no_grad():
             if parameter in squared_norms:  # whose gradients would be sums over both calls
-                raise RuntimeError("a part of the model is called twice in a pass")
+                raise RuntimeError("a part of the model is called twice in one pass")
             step = rules.step(parameter).scaled(gradient_scale)
             squared_norms[parameter] = step.squared_norm(gradients)
 
@@ -118,8 +116,8 @@ def _watched_parts(model: nn.Module) -> list[PatchLinear | PixelMLP]:
     for name, parameter in model.named_parameters():
         if parameter not in covered:
             raise TypeError(
-                f"parameter '{name}' belongs to no PatchLinear layer and no PixelMLP, so its "
-                "gradient per sample is not known: build the network of these, or choose a target "
+                f"parameter '{name}' belongs to neither a PatchLinear layer nor a PixelMLP, so its "
+                "gradient per sample is unknown: build the network from these, or choose a target "
                 "that needs no step norm"
             )
     return parts

@@ -41,7 +41,7 @@ class StepRules:
     def __init__(self, optimizer: torch.optim.Optimizer) -> None:
         if not isinstance(optimizer, torch.optim.Adam | MuonAdam):
             raise TypeError(
-                f"the norm of a step was asked of {type(optimizer).__name__}: choose "
+                f"the norm of a step is unknown for {type(optimizer).__name__}: choose "
                 "torch.optim.Adam (optimizer=adam) or ngi.models.MuonAdam (optimizer=muon), or a "
                 "target that needs no step norm"
             )

@@ -157,7 +157,7 @@ def _mirror(shape: mi.Shape, instance: mi.Shape | None) -> Mirror | None:
     try:
         return Mirror(shape, instance)
     except RuntimeError as error:
-        _logger.warning("'%s' throws no caustics: %s", shape.id(), error)
+        _logger.warning("'%s' is left out of the caustics: %s", shape.id(), error)
         return None
 
 

@@ -108,9 +108,9 @@ class FittingTracer(Tracer):
             self._free()
         if self.split == 0:
             _logger.warning(
-                "a launch of %d pixels x samples does not fit into memory and is traced in parts, "
-                "as all such launches are from now on, with other random numbers than on a "
-                "machine with more memory: %s",
+                "a launch of %d pixels x samples does not fit into memory. From now on such "
+                "launches are traced in parts, so random numbers differ from those on a machine "
+                "with more memory: %s",
                 size,
                 reason,
             )
@@ -124,9 +124,9 @@ class FittingTracer(Tracer):
             rays = f"{samples} samples" if samples > 1 else "one sample"
             fewer = "renderer.buffer_samples, " if samples > 1 else ""
             raise RuntimeError(
-                f"not even {size} pixels with {rays} fit into memory; free it (`nvidia-smi` says "
-                f"what holds it), lower {fewer}renderer.workers or the sizes of the scene's meshes "
-                "and textures, or choose renderer.backend=llvm"
+                f"not even {size} pixels with {rays} fit into memory; free some (`nvidia-smi` "
+                f"lists its users), lower {fewer}renderer.workers or the sizes of the scene's "
+                "meshes and textures, or choose renderer.backend=llvm"
             )
         self.split += 1
         return halves

@@ -15,8 +15,8 @@ def require_told_camera(scene: VariableScene) -> None:
     """Raises ValueError where another variable than look_at and camera_path moves the camera."""
     if scene.scene.sensors()[0].id() in scene.moving:
         raise ValueError(
-            f"{scene.description.name}: the camera is moved by other variables than look_at "
-            "and camera_path: where it is these alone do not tell"
+            f"{scene.description.name}: variables other than look_at and camera_path move the "
+            "camera, so its place does not follow from these alone"
         )
 
 
@@ -30,14 +30,14 @@ def require_perspective(scene: mi.Scene, *, document: SceneFile) -> None:
     if sensor.class_name() != "PerspectiveCamera":
         raise ValueError(
             f"{path}: the camera is a {sensor.class_name()}; make it <sensor "
-            "type='perspective'>: rays all begin in one point here"
+            "type='perspective'>: this program supports only pinhole cameras"
         )
     film = sensor.film()
     width, height = film.size()
     if [*film.crop_size(), *film.crop_offset()] != [width, height, 0, 0]:
         raise ValueError(
-            f"{path}: the film shows a part of its picture; take crop_width, crop_height, "
-            "crop_offset_x and crop_offset_y out"
+            f"{path}: the film is cropped; remove crop_width, crop_height, crop_offset_x and "
+            "crop_offset_y"
         )
     if width != height:
         raise ValueError(
@@ -53,8 +53,8 @@ def _require_no_medium(document: SceneFile) -> None:
     for child in document.root.iterfind("sensor[1]/*"):
         if child.tag == "medium" or (child.tag == "ref" and child.get("id") in media):
             raise ValueError(
-                f"{document.places.get(child, document.path)}: the camera stands in a medium; take "
-                f"this <{child.tag}> out: paths begin in empty space here"
+                f"{document.places.get(child, document.path)}: the camera is in a medium; "
+                f"remove this <{child.tag}>: this program starts paths in empty space"
             )
 
 

@@ -79,7 +79,7 @@ def share_out(machines: Sequence[Mapping[str, float]], workers: int) -> Share:
     cpus = max((cpus for cpus in range(1, most + 1) if room(cpus) >= workers), default=0)
     if cpus == 0:
         raise RuntimeError(
-            f"renderer.workers={workers}: the machines of the Ray cluster have the CPUs for "
-            f"{room(1)} workers; lower renderer.workers"
+            f"renderer.workers={workers}: the Ray cluster has CPUs for only {room(1)} "
+            "workers; lower renderer.workers"
         )
     return Share(cpus=cpus, gpus=1 / per_gpu if gpus else 0)

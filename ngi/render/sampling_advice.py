@@ -36,20 +36,20 @@ def sampling_advice(scene: VariableScene, materials: list[Material]) -> list[str
     lines = ["sampler=sobol: the best known where the error is everywhere and patches are cheap"]
     if causes := _rare(scene, materials):
         lines.append(
-            f"method=ours_eager, where {CONCENTRATED:.0%} and more of a pilot run's loss is on "
-            f"the worst 5% of its patches: {'; '.join(causes)}"
+            f"method=ours_eager, if {CONCENTRATED:.0%} or more of a pilot run's loss is on the "
+            f"worst 5% of its patches: {'; '.join(causes)}"
         )
     spp = scene.description.samples_per_pixel
     if spp >= WORTH_A_SETUP:
         lines.append(
             f"method=ours_small_patches with the scene's {spp} samples per pixel (budget=scarce): "
-            "as many paths on smaller patches of more v, each at the best of four places, have "
-            "less error"
+            "with equally many paths, smaller patches of more v, each at the best of four places, "
+            "have less error"
         )
     if spp >= DEAR:
         lines.append(
-            f"samples per pixel as budget=machine or budget=hour have them instead of {spp}: more "
-            "patches take off more error than any choice of few"
+            f"the samples per pixel of budget=machine or budget=hour instead of {spp}: more "
+            "patches reduce the error more than any choice of few"
         )
     return [*lines, f"see {PAGE}"]
 

@@ -22,8 +22,8 @@ def tracer_of(variant: str, scene: VariableScene, first_hit: FirstHit) -> Tracer
     recorded = variant != "cuda_ad_rgb" or not _has_slow_textures(scene.description)
     if not recorded:
         _logger.warning(
-            "%s: pictures of this scene take longer, since a bitmap has accel=false, which Dr.Jit "
-            "1.5 cannot record on CUDA; take it out, if its precision is not needed",
+            "%s: pictures of this scene take longer, because a bitmap has accel=false, which "
+            "Dr.Jit 1.5 cannot record on CUDA; remove it unless you need its precision",
             scene.description.document.path,
         )
     tracer = JitTracer(scene=scene, first_hit=first_hit, recorded=recorded)

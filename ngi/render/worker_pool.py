@@ -172,8 +172,8 @@ class WorkerPool:
             self._deaths += 1
         if self._deaths > len(self._ready) + 1:
             raise RuntimeError(
-                f"renderer.workers: {self._deaths} workers were lost one after the other and "
-                f"rendered nothing (the last one: {death}); look for 'Out of memory' in "
+                f"renderer.workers: {self._deaths} workers died one after the other without "
+                f"rendering anything (the last one: {death}); look for 'Out of memory' in "
                 "`dmesg` and lower renderer.workers, or see the error with renderer.workers=0"
             )
         _logger.warning(

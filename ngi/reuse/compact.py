@@ -65,7 +65,7 @@ class CompactPatches:
         )
         lengths = {name: len(tensor) for name, tensor in compact.tensors().items()}
         if len(set(lengths.values())) != 1:
-            raise ValueError(f"patches of unequal number: {lengths}: give one of each per patch")
+            raise ValueError(f"patches: parts differ in number: {lengths}; give one per patch")
         images = ("world_position", "other_buffers", "log_radiance")
         found = [getattr(compact, name).isfinite().flatten(1).all(1) for name in images]
         for name, finite in zip(images, torch.stack(found).cpu(), strict=True):

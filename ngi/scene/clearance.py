@@ -148,7 +148,7 @@ def out_of_bounds(scene: VariableScene) -> list[str]:
                 farthest[name] = max(farthest.get(name, 0.0), out)
     size = float(np.linalg.norm(high - low))
     return [
-        f"'{name}' reaches {far:.3g} out of bounds; where the camera can see that, widen bounds"
+        f"'{name}' reaches {far:.3g} out of bounds; if the camera can see that part, widen bounds"
         for name, far in sorted(farthest.items(), key=lambda item: -item[1])
         if far > TOLERANCE * size
     ]
@@ -175,8 +175,8 @@ def meeting_views(description: SceneDescription) -> list[str]:
     """A line for every look_at whose origin and target can be the same point."""
     return [
         f"{'+'.join(variable.objects)}.look_at: origin and target can meet, for example at "
-        f"{place.round(3).tolist()}, where the camera looks nowhere; keep their ranges apart along "
-        "one axis"
+        f"{place.round(3).tolist()}, which leaves no viewing direction; keep their ranges apart "
+        "along one axis"
         for variable in description.variables
         if isinstance(variable, LookAt) and (place := _meeting(variable)) is not None
     ]

@@ -69,14 +69,14 @@ class _Complaint:
         for child in element:
             if child.get("name") in unknown:
                 kind = f"<{element.tag} type='{element.get('type')}'>"
-                return child, f"a {kind} has nothing of this name; correct it, or take it out"
+                return child, f"a {kind} has no parameter of this name; correct or remove it"
         if (match := _UNRESOLVED.search(message)) is not None:
             for child in element.findall("ref"):
                 if child.get("id") == match["name"]:
                     return child, f"no object has this id{self._near(match['name'])}"
         for sibling in self.parents.get(element, ()):
             if sibling is not element and sibling.get("name") == element.get("name", ""):
-                twice = f"its name stands in {self.place(sibling)} too; take one out"
+                twice = f"{self.place(sibling)} has the same name; remove one of them"
                 return element, f"{message}; {twice}"
         return element, message
 
@@ -105,7 +105,7 @@ def load(document: SceneFile) -> mi.Scene:
         if element.get("type") in FROM_FILES and element.find("string[@name='filename']") is None:
             place = copied.places.get(element, document.path)
             name = named(element, parents_in(absolute))
-            raise ValueError(f"{place}: {name} names no file; give it <string name='filename' …/>")
+            raise ValueError(f"{place}: {name} names no file; add <string name='filename' …/>")
     ElementTree.indent(absolute, space="")  # a tag per line, by which Mitsuba's place is known
     text = ElementTree.tostring(absolute, encoding="unicode")
     # Side by side, materials would get their numbers in another order each time, and those are

@@ -27,7 +27,7 @@ def _no(reason: str) -> Offer:
 
 _NOISE = _no("it changes how noisy a rendering is, not the picture")
 _COMPILED = _no(
-    "Mitsuba compiles it into its kernels, which takes longer for every value than the patch"
+    "Mitsuba compiles it into its kernels, so each value would take longer than a patch"
 )
 _SMOOTH = _no(
     "Mitsuba compiles the eta of a smooth BSDF into its kernels; take a thindielectric or "
@@ -35,22 +35,22 @@ _SMOOTH = _no(
 )
 _METAL = _no("it is a spectrum; let 'material' choose between BSDFs")
 _COAT = _no("'albedo' varies its diffuse_reflectance")
-_IMAGE = _no("the image of a light does not vary; its intensity and its place do")
+_IMAGE = _no("the image of a light cannot vary; its intensity and its place can")
 _SKY = _no(
     "Mitsuba computes such a sky anew in kernels of its own; vary a directional emitter's "
     "direction and an envmap's rotation"
 )
 _RUN = _no("a run sets it for all its images")
 _STILL = _no("nothing moves while the shutter is open")
-_SHIFT = _no("where the camera looks varies by look_at and fov")
-_TOPOLOGY = _no("the triangles of a mesh stay; key_frames moves their corners")
-_COORDINATES = _no("texture coordinates stay; 'texture' and 'texels' vary what lies on them")
-_RELIEF = _no("its bumps stay; let 'material' choose between BSDFs")
-_CURVE = _no("its arrays stay; translation, rotation and scale move it as a whole")
-_LENS = _no("a camera is a pinhole here: the buffers know one point per pixel and ray")
-_CAMERA = _no("a camera is a perspective one here")
-_UNKNOWN = _no("the buffers do not know the albedo and roughness of such a BSDF")
-_MEDIUM = _no("the buffers tell of surfaces only, not of a medium")
+_SHIFT = _no("use look_at and fov to vary the view")
+_TOPOLOGY = _no("the triangles of a mesh are fixed; key_frames moves their corners")
+_COORDINATES = _no("texture coordinates are fixed; vary the image with 'texture' and 'texels'")
+_RELIEF = _no("its bumps are fixed; let 'material' choose between BSDFs")
+_CURVE = _no("its arrays are fixed; translation, rotation and scale move it as a whole")
+_LENS = _no("only pinhole cameras are supported: buffers hold one point per pixel and ray")
+_CAMERA = _no("only perspective cameras are supported")
+_UNKNOWN = _no("the buffers cannot represent the albedo and roughness of such a BSDF")
+_MEDIUM = _no("the buffers represent surfaces only, not media")
 _COLOURED = _no("it is not one colour; 'texture' and 'texels' vary bitmaps")
 
 _SHAPE = _by("translation", "rotation", "scale", "visibility", "shape")

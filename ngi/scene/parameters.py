@@ -67,7 +67,7 @@ class Parameters:
         Of two the last to change would win, so that the same v were not always the same scene.
         """
         if (other := self._taken.setdefault(what, self._taker)) != self._taker:
-            raise ValueError(f"it sets {name}, as {other} does; leave one of the two out")
+            raise ValueError(f"it sets {name}, which {other} sets too; remove one of the two")
 
     def parameter(
         self, object_id: str, suffixes: tuple[str, ...], *, hint: str, of: Sequence[str] = ()
@@ -104,7 +104,7 @@ class Parameters:
                 if len(alike) > 1:
                     raise ValueError(
                         f"{self._file}: {name} has several {suffix}: {alike}; give an id to the "
-                        "part that is meant, and name that"
+                        "part you mean, and use that in scene.yaml"
                     )
                 self._found.add(found)
                 return found

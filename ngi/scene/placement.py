@@ -77,7 +77,7 @@ class Placement:
         """A function that makes the object vanish at 0 and appear at 1."""
         if self._parking is None:
             raise ValueError(
-                "scene.yaml: an emitter cannot be hidden; vary its intensity, down to 0"
+                "scene.yaml: an emitter cannot be hidden; vary its intensity down to 0 instead"
             )
         hidden = self._parking
         set_matrix = self._slot(order=2)

@@ -32,11 +32,11 @@ def allowed_file(folder: Path, name: str, *, within: Path, where: str) -> Path:
     if not any(real.is_relative_to(place) for place in (within.resolve(), *_assets())):
         raise ValueError(
             f"{where} names '{name}', which is {real}, outside of the scene's folder {within}; "
-            f"bring it there, or allow it where you trust the scene: {ASSETS}={real.parent}"
+            f"copy it there or, if you trust the scene, set {ASSETS}={real.parent}"
         )
     if not exists:
         raise FileNotFoundError(
-            f"{where} names '{name}', which is not there; bring the file to {path} or correct the "
+            f"{where} names '{name}', which does not exist; put the file at {path} or correct the "
             "name"
         )
     return path

@@ -70,8 +70,8 @@ class SceneParameters(Parameters):
         body = self._body(object_id, owner)
         if finite and is_infinite(owner):
             raise ValueError(
-                f"{self._file}: '{object_id}' is infinitely far away, as every "
-                f"{owner.class_name()}; vary its rotation or, of a sun, its direction"
+                f"{self._file}: '{object_id}' is infinitely far away, like every "
+                f"{owner.class_name()}; vary its rotation, or a sun's direction"
             )
         if body.key not in self._placements:  # a group has that of what is in it
             parked = None if emits(owner) else parking(self._size)
@@ -97,7 +97,7 @@ class SceneParameters(Parameters):
         key = self.find(
             object_id,
             ("to_world", "position"),
-            hint="it has no place that could vary; a lamp's is its shape's",
+            hint="its place cannot vary; to move a lamp, name its shape",
         )
         return Transformed(self, key) if key.endswith("to_world") else Positioned(self, key)
 
@@ -122,7 +122,7 @@ class SceneParameters(Parameters):
         hint = "name an emitter, or the shape that carries it, with a constant radiance"
         key = self.find(object_id, EMISSIONS, hint=hint)
         if key.endswith(".scale") and not isinstance(self.owner(key), mi.Emitter):
-            raise ValueError(f"{self._file}: {key} of '{object_id}' is no emitter's; {hint}")
+            raise ValueError(f"{self._file}: {key} of '{object_id}' is not an emitter's; {hint}")
         if key not in self._emissions:  # which may be known by its own id and by its shape's
             self._emissions[key] = Emission(self, key)
         return self._emissions[key]

@@ -67,8 +67,8 @@ class VariableScene:
         if owners and all(isinstance(owner, mi.Sensor) and owner != first for owner in owners):
             name = f", '{first.id()}'," if first is not None and first.id() else ""
             raise ValueError(
-                f"'{owners[0].id()}' is not rendered, but the first sensor of the file{name} is; "
-                "name that one, or put this one first"
+                f"'{owners[0].id()}' is not rendered: only the first sensor of the file{name} is; "
+                "name that sensor, or move this one to the front"
             )
 
     def _is_of_cameras(self, variable: Variable) -> bool:

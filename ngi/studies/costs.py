@@ -139,8 +139,8 @@ def _warn_if_busy() -> None:
     load, *_ = os.getloadavg()
     if load > BUSY:
         log.warning(
-            "this machine is busy (load average %.1f on %d cores): costs measured now are those of "
-            "a busy machine; stop what else is running, delete them from the file, measure again",
+            "this machine is busy (load average %.1f on %d cores), which makes measured costs too "
+            "high; stop other programs, delete these costs from the file and measure again",
             load,
             usable_cores(),
         )

@@ -54,7 +54,7 @@ def measure(config: DictConfig) -> list[tuple[str, float, float, float]]:
     folder = Path(config.run.folder)
     path = folder / LAST
     if not path.exists():
-        raise ValueError(f"{path} is not there; name a run as its own command line does")
+        raise ValueError(f"{path} does not exist; give the command line that started the run")
     checkpoint = learn.read_checkpoint(path)
     weights = {
         name.removeprefix(NETWORK): value
@@ -92,8 +92,8 @@ def _states(config: DictConfig, stream: dict[str, object]) -> tuple[dict[str, Te
     sampler, generator = instantiate(config.sampler), torch.Generator().manual_seed(config.seed)
     if sampler.needs_description:
         raise ValueError(
-            "sampler: it looks at patches before they are traced, which this study does not; name "
-            "a run whose sampler does not, for example one of method=ours"
+            "sampler: it inspects patches before they are traced, which this study does not "
+            "support; name a run with another sampler, for example one of method=ours"
         )
     chains = type(sampler.init(2)).from_state_dict(stream["chains"])
     counters = Counters(**stream["counters"])  # type: ignore[arg-type]
@@ -116,7 +116,7 @@ def _renderer(config: DictConfig, folder: Path, *, factor: int) -> Renderer:
     renderer: Renderer = instantiate(chosen)
     scene = json.loads((folder / "settings.json").read_text())["scene"]
     if scene["hash"] != renderer.scene_hash:
-        raise ValueError(f"{folder} is a run of '{scene['name']}' as it was then, not of this one")
+        raise ValueError(f"{folder} is a run of an earlier version of the scene '{scene['name']}'")
     samples = factor * renderer.samples_per_pixel
     renderer.close()
     with open_dict(chosen):

@@ -29,15 +29,15 @@ def claim(folder: Path, made_with: Mapping[str, Any], *, backend: str, option: s
     for key, value in made_with.items():
         if found.setdefault(key, value) != json.loads(json.dumps(value)):
             raise ValueError(
-                f"{file}: the runs in this folder were made with another {key} than now; give "
+                f"{file}: the runs in this folder were made with a different {key}; give "
                 f"another {option}, or move the folder away"
             )
     commits, version = found.setdefault("commits", []), code_version()
     if not (commits and same_program(commits[-1], version)):
         if commits:
             log.warning(
-                "%s: goes on with %s; what is there was made with %s. If what is computed has "
-                "changed in between, give another %s",
+                "%s: resumes with %s; the earlier results were made with %s. If the computation "
+                "has changed in between, give another %s",
                 *(folder, shown(version), shown(commits[-1]), option),
             )
         commits.append(version)

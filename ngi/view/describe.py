@@ -42,7 +42,7 @@ def describe(options: DescribeOptions) -> int:
         return 0
     elif not path.exists():
         raise FileNotFoundError(
-            f"{path}: no such file or folder, and no scene of this name; known are "
+            f"{path}: no such file or folder, and no scene of this name; known scenes: "
             f"{', '.join(sorted(scenes()))}"
         )
     else:

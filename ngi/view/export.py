@@ -81,8 +81,8 @@ def _checked(
         difference = largest_difference(content, network, buffers, v)
         if not difference <= TOLERANCE:  # NaN is too large
             raise ValueError(
-                f"the exported network differs from the one of the run by {difference:.2g} of "
-                f"1 + radiance on {name}, more than {TOLERANCE:g}; nothing was written"
+                f"the exported network differs from the run's by {difference:.2g} (relative to "
+                f"1 + radiance) on {name}, more than {TOLERANCE:g}; nothing was written"
             )
         shown.append(f"{difference:.1e} on {name}")
     return ", ".join(shown)

@@ -97,7 +97,7 @@ class LiveView(Callback):
         try:
             self._refresh()
         except Exception:
-            log.exception("the page's picture of the training failed; the training goes on")
+            log.exception("the viewer could not draw the training; training continues")
 
     def _refresh(self) -> None:
         store, current = self._run.stream.store, self._run.stream.chains.position
@@ -144,7 +144,7 @@ def live_view(
 
     studio = Studio(renderer=run.renderer, predict=predict)
     page = Page(studio, about, resolution=protocol.resolution, host="127.0.0.1", port=port)
-    log.info("%s shows the training", page.where)
+    log.info("watch the training at %s", page.where)
     if description is None:
         variables: Sequence[str] = [f"{control.group} {control.name}" for control in about.controls]
     else:

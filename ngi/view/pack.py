@@ -50,7 +50,7 @@ def pack(options: PackOptions) -> None:
     if checkpoint["global_step"] != origin.get("steps"):
         raise ValueError(
             f"run: {run} has a {result.name} of step {origin.get('steps')}, but its newest "
-            f"checkpoint that is whole is of step {checkpoint['global_step']}"
+            f"undamaged checkpoint is of step {checkpoint['global_step']}"
         )
     weights = trained_weights(checkpoint["state_dict"])
     content = {

@@ -149,7 +149,7 @@ class Panel:
         anywhere = self._gui.add_button("random configuration")
         hint = "to v before the last preset, random configuration, file or reset"
         back = self._gui.add_button("back", hint=hint)
-        reset = self._gui.add_button("reset", hint="everything as it was at first")
+        reset = self._gui.add_button("reset", hint="restore the initial v and settings")
 
         @menu.on_update  # type: ignore[untyped-decorator]
         def _(_: object) -> None:
@@ -187,7 +187,7 @@ class Panel:
 
     def _add_inputs(self, controls: Sequence[Control]) -> None:
         if len(controls) > MOST_SLIDERS:
-            self._gui.add_markdown(f"{len(controls)} variables: too many for sliders")
+            self._gui.add_markdown(f"{len(controls)} variables, too many for sliders: use presets")
             return
         for group, members in groupby(inputs(controls), key=lambda each: each.group):
             with self._gui.add_folder(group):

@@ -76,7 +76,7 @@ def _denoiser(settings: dict[str, Any] | None) -> Denoiser | None:
     target = settings["_target_"]
     if target not in DENOISERS:
         raise ValueError(
-            f"settings.json: path_tracing.denoiser._target_ is '{target}', which no option of the "
-            "group path_tracing names; only what comes with this program is opened"
+            f"settings.json: path_tracing.denoiser._target_ is '{target}', which is not part of "
+            "this program (no option of the group path_tracing names it)"
         )
     return DENOISERS[target]()

@@ -89,8 +89,8 @@ def settings_of(folder: Path) -> Iterator[dict[str, Any]]:
         yield settings
     except (KeyError, TypeError) as error:
         raise ValueError(
-            f"{folder}: settings.json or result.json is damaged, or of another version of the "
-            f"program ({error!r})"
+            f"{folder}: settings.json or result.json is damaged, or from another version of "
+            f"the program ({error!r})"
         ) from error
 
 
@@ -109,8 +109,8 @@ def made_by(settings: dict[str, Any], group: str) -> Callable[..., Any]:
     trusted = isinstance(target, str) and (target in known or target.partition(".")[0] in own)
     if not trusted:
         raise ValueError(
-            f"settings.json: {group}._target_ is '{target}', which no option of the group {group} "
-            "names; only what comes with this program is opened. If it is your own, say so: "
+            f"settings.json: {group}._target_ is '{target}', which is not part of this program (no "
+            f"option of the group {group} names it). If it is your own code, set "
             f"{TRUSTED}={str(target).partition('.')[0]}"
         )
     make: Callable[..., Any] = get_object(target)
@@ -132,8 +132,8 @@ def make_samples(
     if supersampled_edges:
         if make is not PatchSamples:
             raise ValueError(
-                "supersampled_edges: this run's network makes whole images of "
-                f"{make.__name__}, and can not be asked for quarters of a pixel; leave it out"
+                f"supersampled_edges: this run's network makes whole images from {make.__name__} "
+                "and cannot be evaluated for quarters of a pixel; leave the option out"
             )
         numbers["supersampled_edges"] = True
     samples: Samples = make(**numbers, renderer=renderer)
@@ -165,8 +165,8 @@ def describe_scene(
     if name not in (known := scenes()):
         gone = "" if place is None else f", nor at {place.get('folder', place.get('path'))}"
         raise ValueError(
-            f"scene '{name}' is not known here{gone}: name the folder above it in NGI_SCENES, or "
-            "one of the authors' scenes by scene=FOLDER"
+            f"scene '{name}' is not found{gone}: set NGI_SCENES to the folder that contains it, or "
+            "give the folder of one of the paper authors' scenes with scene=FOLDER"
         )
     return read_scene(**known[name])
 
@@ -196,8 +196,8 @@ def make_renderer(
     changed = renderer.scene_hash != settings["scene"]["hash"]
     if changed and not (description is not None and _renders_the_same(folder, description)):
         raise ValueError(
-            f"{folder} was trained on '{settings['scene']['name']}' as it was then; the scene has "
-            "changed since, and a network knows only what it was trained on"
+            f"{folder} was trained on an earlier version of '{settings['scene']['name']}'; its "
+            "network does not know the scene as it is now"
         )
     return renderer
 

@@ -76,7 +76,7 @@ def _read(file: Path, *, dimensions: int) -> Tensor:
     try:
         vectors = json.loads(file.read_text())
     except ValueError as error:
-        raise ValueError(f"path: {file} is no JSON file ({error})") from error
+        raise ValueError(f"path: {file} is not a JSON file ({error})") from error
     if isinstance(vectors, dict) and "v" in vectors:
         vectors = [vectors["v"]]
     if not isinstance(vectors, list) or not vectors:

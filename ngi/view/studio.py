@@ -122,7 +122,7 @@ class Studio:
         try:
             do()
         except Exception as error:
-            log.exception("a picture of the page failed")
+            log.exception("the viewer could not make a picture")
             failed(error)
         return True
 

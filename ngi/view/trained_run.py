@@ -120,7 +120,7 @@ def newest_checkpoint(folder: Path, settings: Mapping[str, Any]) -> dict[str, An
     """
     if "path_tracing" in settings:
         raise ValueError(
-            f"{folder} has no network: path tracing took its place; `ngi video` shows its frames"
+            f"{folder} has no network: it is a path tracing run; `ngi video` shows its frames"
         )
     problems = []
     for path in (folder / name for name in (LAST, PREVIOUS)):
@@ -132,8 +132,8 @@ def newest_checkpoint(folder: Path, settings: Mapping[str, Any]) -> dict[str, An
             problems.append(str(error))
             continue
         for problem in problems:
-            log.warning("%s; the checkpoint before it is used", problem)
+            log.warning("%s; using the previous checkpoint", problem)
         return checkpoint
     if problems:
         raise ValueError("; ".join(problems))
-    raise FileNotFoundError(f"{folder}: no checkpoint yet; a run writes one every minute or so")
+    raise FileNotFoundError(f"{folder}: no checkpoint yet; a run saves one a minute by default")

@@ -103,7 +103,7 @@ def _check(options: VideoOptions, *, figures: Path) -> None:
     if options.reference < 0 or options.reference % 2:
         raise ValueError(f"reference: {options.reference}; it has to be an even number, or 0")
     if not 2 <= options.seconds * options.frames_per_second < float("inf"):
-        raise ValueError(f"seconds: {options.seconds}; a video has two frames at least")
+        raise ValueError(f"seconds: {options.seconds}; a video needs at least two frames")
 
 
 def _check_replaced(options: VideoOptions, figures: Path) -> None:
@@ -114,7 +114,7 @@ def _check_replaced(options: VideoOptions, figures: Path) -> None:
         _ = film["measure"]
     except (ValueError, KeyError, TypeError, AttributeError):
         raise ValueError(
-            f"out: {figures}, where the figures would be written, is there and no video's; "
+            f"out: {figures}, the file for the measurements, exists but is not a video's; "
             "choose another name"
         ) from None
     now = _decisive(asdict(options), map(Path, (options.run, *(options.beside or ()))))
@@ -124,8 +124,8 @@ def _check_replaced(options: VideoOptions, figures: Path) -> None:
     if measured and apart:
         was, would_be = (", ".join(f"{key}={of[key]}" for key in apart) for of in (before, now))
         raise ValueError(
-            f"out: {figures} holds what was measured with {was}, and would be replaced by a video "
-            f"with {would_be}; give this one another name with out=…, or delete that one"
+            f"out: {figures} holds measurements with {was}; a video with {would_be} would replace "
+            "them; give this video another name with out=…, or delete that file"
         )
 
 
@@ -162,7 +162,7 @@ def _film(options: VideoOptions, stack: ExitStack) -> Film:
     runs: list[TrainedRun | PathTracedRun] = []
     for folder in map(Path, (options.run, *(options.beside or ()))):
         if folder.resolve() in (run.folder.resolve() for run in runs):
-            raise ValueError(f"beside: {folder} is there already")
+            raise ValueError(f"beside: {folder} is given twice")
         run = open_run(
             folder, scene_path=options.scene, supersampled_edges=options.supersampled_edges
         )

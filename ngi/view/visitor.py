@@ -151,7 +151,7 @@ class Visitor:
         view, protocol = shown.view, self._subject.protocol
         smallest = protocol.ssim_window
         if min(view.prediction.shape[:2]) < smallest:
-            return f"metrics take {smallest} pixels a side"
+            return f"metrics need at least {smallest} pixels a side"
         reference = view.reference
         measured = image_metrics(view.prediction, reference, protocol=protocol, lpips=None)
         said = {name: f"{value:.3g}" for name, value in measured.items() if value is not None}
@@ -213,7 +213,7 @@ class Visitor:
         wish, last = self.wish, self._last
         samples = 0 if last is None or last.view.place != wish.place else last.view.samples
         rounded = 1 << samples.bit_length() >> 1
-        return self._command_for(wish, rounded) or "no command makes pictures of buffers"
+        return self._command_for(wish, rounded) or "ngi render does not render buffers"
 
     def _command_for(self, wish: Wish, samples: int) -> str | None:
         """What makes a picture without the page; None of a buffer.

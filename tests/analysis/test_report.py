@@ -202,7 +202,7 @@ def test_what_cannot_be_reported_is_one_line_and_writes_nothing(make_run, tmp_pa
     make_run(seed=1, change=lambda result: result["protocol"].update(identity="other"))
     assert main([str(tmp_path / "runs")]) == 1
     error = capsys.readouterr().err
-    assert error.startswith("error: runs of two protocols")
+    assert error.startswith("error: runs with different protocols")
     assert error.count("\n") == 1
     assert not (tmp_path / "runs" / "report").exists()
 

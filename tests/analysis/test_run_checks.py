@@ -98,7 +98,7 @@ def of_before_checksums(folder: Path) -> None:
             without_checksums(
                 "metrics.csv", lambda f: f.write_text("step,run_seconds,a\n1,2,3\n2,3,x\n")
             ),
-            "metrics.csv, line 3: a is 'x', which is no number",
+            "metrics.csv, line 3: a is 'x', which is not a number",
         ),
         (
             without_checksums("chains.bin", lambda file: file.write_bytes(b"?\n")),
@@ -124,7 +124,7 @@ def of_before_checksums(folder: Path) -> None:
         ),
         (replace_in("result.json", '"seconds": {', '"minutes": {'), "no 'seconds'"),
         (replace_in("result.json", '"patches_traced": ', '"patches_traced": "x", "p": '), "is 'x'"),
-        (replace_in("result.json", '"reuse": "self_tuning"', '"reuse": true'), "which is no text"),
+        (replace_in("result.json", '"reuse": "self_tuning"', '"reuse": true'), "is not a text"),
         (
             replace_in("result.json", '"train": 120.0', '"train": 1' + 400 * "0"),
             "seconds.train is '1000",
@@ -170,4 +170,4 @@ def test_a_text_as_a_frame_s_error_is_named(make_run, tmp_path) -> None:
     make_run(seed=0)
     make_run(seed=1, change=change)
     _, (warning,) = find_runs(tmp_path)
-    assert "frames.2.mape is 'much', which is no number" in warning
+    assert "frames.2.mape is 'much', which is not a number" in warning

@@ -174,7 +174,7 @@ def damage(folder: Path, kind: str) -> None:
         ("no history", "metrics.csv cannot be read"),
         ("empty history", "metrics.csv cannot be read"),
         ("foreign history", "metrics.csv cannot be read"),
-        ("trace alone", "there is chains.bin, and no steps.csv beside it"),
+        ("trace alone", "there is a chains.bin but no steps.csv"),
     ],
 )
 def test_damaged_and_unfinished_runs_are_named(make_run, tmp_path, kind: str, reason: str) -> None:

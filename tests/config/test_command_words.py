@@ -95,11 +95,11 @@ def test_an_option_may_stand_among_overrides() -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["a=b", "--budget", "small"], "--budget: there is no such option; .* as budget=…"),
-        (["--seed=1"], "--seed=1: there is no such option; .* without dashes, as seed=1 "),
-        (["a=b", "--cfg", "job", "c=d"], "^c=d: options have to come before"),
-        (["+sweeps=demo", "a=b"], "^.sweeps=demo: a sweep is several runs, give -m"),
-        (["--dry-run", "+sweeps=demo"], "^.sweeps=demo: a sweep is several runs, give -m"),
+        (["a=b", "--budget", "small"], "--budget: there is no such option; .*: budget=…"),
+        (["--seed=1"], "--seed=1: there is no such option; .* without dashes: seed=1 "),
+        (["a=b", "--cfg", "job", "c=d"], "^c=d: put options, such as -m, before all words"),
+        (["+sweeps=demo", "a=b"], "^.sweeps=demo: a sweep needs -m"),
+        (["--dry-run", "+sweeps=demo"], "^.sweeps=demo: a sweep needs -m"),
     ],
 )
 def test_what_is_no_option_is_answered_by_what_it_may_be(words: list[str], message: str) -> None:

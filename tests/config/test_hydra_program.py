@@ -42,7 +42,7 @@ from tests.learn.command_line import SMALL, run, run_module
             "adam_small, adam_tuned, muon; did you mean 'adam'?",
         ),
         ("+sweeps=xyz", "sweeps/xyz: there is no such option; sweeps can be acceptance, anf, "),
-        ("seed", "'seed': give key=value, without blanks around the ="),
+        ("seed", "'seed': write key=value, without spaces around the ="),
         ("seed=[1", "'seed=[1': no viable alternative at input '[1'"),
         ("seed=0,1", "3. To sweep over it, give -m"),
         ("supersampled_edges=1", "_edges: there is no such key; there are seed, viewer, "),
@@ -75,7 +75,7 @@ def test_of_a_scene_without_a_description_what_writes_one_is_named(
 
 def test_a_full_graphics_card_is_told_what_takes_its_memory() -> None:
     said = in_plain_words(torch.OutOfMemoryError("CUDA out of memory"))
-    assert said.startswith("CUDA out of memory\nthe graphics card has no room")
+    assert said.startswith("CUDA out of memory\nthe GPU is out of memory: free some")
     assert "sampler.chains" in said
     assert in_plain_words(RuntimeError("CUDA")) == "CUDA"
 
@@ -100,7 +100,7 @@ def test_a_sweep_whose_settings_are_asked_for_is_told_how(tmp_path: Path) -> Non
     status, output = run_module("ngi.train", "-m", "seed=0,1", "--cfg", "job", folder=tmp_path)
     assert status == 1
     assert output.count("\n") == 1
-    assert output.endswith("the settings of one run of a sweep: without -m, --cfg job\n")
+    assert output.endswith("the settings of one run of a sweep, leave out -m: --cfg job\n")
 
 
 @pytest.mark.parametrize("module", ["ngi.train", "ngi.studies.costs", "ngi.studies.noise"])

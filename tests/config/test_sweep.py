@@ -48,7 +48,7 @@ def test_before_it_starts_its_runs_are_listed(finished: tuple[Path, str]) -> Non
     assert rows(before) == {
         name: ["new", "0%", "?"] for name in ("0.001-0", "-1-0", "0.001-1", "-1-1")
     }
-    assert "4 runs: 4 new; how long they take is not known" in before
+    assert "4 runs: 4 new; how long they take is unknown" in before
     words = re.findall(r"0%\s+\?\s+(.*)", before)
     expected = [f"optimizer.lr={lr} seed={seed}" for lr in ("0.001", "-1") for seed in (0, 1)]
     assert sorted(words) == sorted(expected)
@@ -144,7 +144,7 @@ def test_what_has_no_checkpoint_can_not_be_planned_longer(
     words = ("seed=0", "optimizer.lr=1e-3", "budget.steps=24")
     status, output = sweep(place, *words, options=("-m", "--dry-run"))
     assert status == 1
-    assert "cannot start: it can not be trained longer: there is no checkpoint" in output
+    assert "cannot start: it cannot be trained longer: there is no checkpoint" in output
 
 
 def test_scenes_of_two_names_are_two_runs(tmp_path: Path) -> None:
@@ -152,7 +152,7 @@ def test_scenes_of_two_names_are_two_runs(tmp_path: Path) -> None:
     words = ("seed=0", "scene=mirror,cornell-box")
     status, output = sweep(tmp_path, *words, options=("-m", "--dry-run"))
     assert status == 1
-    assert "an earlier run of this sweep has its folder" in output
+    assert "an earlier run of this sweep uses its folder" in output
 
 
 def test_a_plan_names_values_and_folders_with_which_runs_cannot_start(tmp_path: Path) -> None:
@@ -164,7 +164,7 @@ def test_a_plan_names_values_and_folders_with_which_runs_cannot_start(tmp_path: 
     status, output = sweep(tmp_path, folder, options=("-m", "--dry-run"))
     assert status == 1, output
     assert "1 new" in output
-    assert "an earlier run of this sweep has its folder" in output
+    assert "an earlier run of this sweep uses its folder" in output
 
 
 def test_a_key_that_all_options_of_a_sweep_have_is_given_with_two_plus_signs(
@@ -222,14 +222,14 @@ def test_without_a_file_of_costs_nobody_knows_how_long_steps_take(tmp_path: Path
     words = ("budget=steps", "budget.steps=9", "budget.costs=null", PLACE)
     status, output = run(tmp_path, *words, options=("--dry-run",), base=SIZE)
     assert status == 0, output
-    assert "1 run: 1 new; how long they take is not known" in output
+    assert "1 run: 1 new; how long they take is unknown" in output
 
 
 def test_a_clock_without_costs_is_said_before_anything_runs(tmp_path: Path) -> None:
     words = ("budget=seconds", "budget.clock=model", "budget.costs=none.json", PLACE)
     status, output = run(tmp_path, *words, options=("--dry-run",), base=SIZE)
     assert status == 1, output
-    assert "cannot start: budget.costs: none.json is not there; measure it by" in output
+    assert "cannot start: budget.costs: none.json does not exist; measure it with" in output
 
 
 @pytest.mark.parametrize(
@@ -290,7 +290,7 @@ def test_a_folder_with_other_settings_is_named(tmp_path: Path) -> None:
     (folder / "settings.json").write_text("{}")
     status, output = sweep(tmp_path, "seed=0", options=("-m", "--dry-run"))
     assert status == 1, output
-    assert "settings.json is no run's" in output
+    assert "settings.json is not of a run" in output
     (folder / "settings.json").write_text("{")
     _, output = sweep(tmp_path, "seed=0", options=("-m", "--dry-run"))
     assert "settings.json is damaged" in output
@@ -327,7 +327,7 @@ def test_the_table_adds_up() -> None:
     runs = [planned("new", 3000), planned("interrupted", 700), planned("again", None)]
     shown = table([*runs, planned("finished", 0), planned("cannot start: no", None)])
     assert "5 runs: 1 new, 1 interrupted, 1 again, 1 finished, 1 cannot start;" in shown
-    assert "about 1:01:40 of training left; how long 1 of them take is not known" in shown
+    assert "about 1:01:40 of training left; how long 1 of them take is unknown" in shown
 
 
 @pytest.mark.parametrize(

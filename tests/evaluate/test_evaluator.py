@@ -303,7 +303,7 @@ def test_references_above_the_noise_level_are_reported_once(
     )
     with caplog.at_level("INFO"):
         evaluator.prepare()
-    lines = [r for r in caplog.records if "references stayed above" in r.getMessage()]
+    lines = [r for r in caplog.records if "references still have more than" in r.getMessage()]
     assert len(lines) == int(said)
 
 

@@ -154,7 +154,7 @@ def test_tiny_and_huge_values_keep_their_proportion() -> None:
         ({"uniform_share": 0.5, "power": 0.0}, "power: 0.0"),
         ({"uniform_share": 0.5, "largest_ratio": 0.9}, "largest_ratio: 0.9"),
         ({"uniform_share": 0.5, "largest_ratio": float("nan")}, "largest_ratio: nan"),
-        ({"uniform_share": 0.0, "weighted": True}, "no bound"),
+        ({"uniform_share": 0.0, "weighted": True}, "unbounded"),
     ],
 )
 def test_numbers_out_of_range_are_refused(arguments: dict[str, float], named: str) -> None:

@@ -199,5 +199,5 @@ def test_of_patches_of_one_image_the_better_are_drawn() -> None:
 
 
 def test_more_dimensions_than_there_are_sequences_for_are_refused_at_the_start() -> None:
-    with pytest.raises(ValueError, match=r"known for at most 21201; choose"):
+    with pytest.raises(ValueError, match=r"exist for at most 21201; choose"):
         looking().init(21_202)

@@ -18,7 +18,7 @@ def test_an_error_holds_no_view_of_memory(tmp_path: Path, monkeypatch: pytest.Mo
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(OSError, match="Make room") as caught:
+    with pytest.raises(OSError, match="Free disk space") as caught:
         write_tensors(tmp_path / "tensors.pt", {"a": torch.zeros(3)})
     frames = [frame for frame, _ in traceback.walk_tb(caught.tb)]
     views = [v for f in frames for v in f.f_locals.values() if isinstance(v, memoryview)]

@@ -67,7 +67,7 @@ def test_a_disk_that_knows_no_locks_is_named(tmp_path: Path, monkeypatch) -> Non
         raise OSError(errno.ENOSYS, "Function not implemented")
 
     monkeypatch.setattr(fcntl, "flock", unknown)
-    with pytest.raises(OSError, match=r"this disk can not lock files, .*run\.folder=…"):
+    with pytest.raises(OSError, match=r"this disk cannot lock files, .*run\.folder=…"):
         RunFolder(tmp_path, settings=SETTINGS)
 
 
@@ -76,7 +76,7 @@ def test_a_folder_that_can_not_be_written_to_is_named(tmp_path: Path, place: str
     """As root too, whom no permissions bind."""
     (tmp_path / "file").touch()
     path = tmp_path / "file" / "run" if place == "below a file" else Path("/proc/run")
-    with pytest.raises(OSError, match=rf"can not be written to; .*run\.folder=….*'{path}'"):
+    with pytest.raises(OSError, match=rf"is not writable; .*run\.folder=….*'{path}'"):
         RunFolder(path, settings=SETTINGS)
 
 

@@ -115,7 +115,9 @@ def test_what_asks_the_device_is_launched_as_it_is_and_said_once(
         x = random(5, 3)
         assert torch.equal(recorded(x)[0].cpu(), network(x).cpu())
     (line,) = (r.getMessage() for r in caplog.records if r.levelno >= logging.WARNING)
-    assert line.startswith("asking: not recorded as a CUDA graph, launched kernel by kernel: CUDA")
+    assert line.startswith(
+        "asking: not recorded as a CUDA graph, kernels are launched one by one: CUDA"
+    )
 
 
 def test_on_the_cpu_nothing_is_recorded(caplog: pytest.LogCaptureFixture) -> None:

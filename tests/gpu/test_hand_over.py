@@ -71,8 +71,8 @@ def test_in_another_stream_nothing_is_handed_over(in_stream: Any) -> None:
     """Dr.Jit would not wait for what is done there, and could write over what is still read."""
     in_stream(94_000)
     array = CudaArray([1.0])
-    with pytest.raises(RuntimeError, match=r"leave torch.cuda.stream"):
+    with pytest.raises(RuntimeError, match=r"outside of torch.cuda.stream"):
         stacked([array])
-    with pytest.raises(RuntimeError, match=r"leave torch.cuda.stream"):
+    with pytest.raises(RuntimeError, match=r"outside of torch.cuda.stream"):
         overwrite(array, np.array([2.0]))
     assert array.memory.tolist() == [1]

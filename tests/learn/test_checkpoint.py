@@ -98,10 +98,10 @@ def test_a_run_with_a_damaged_file_ends_like_a_whole_one(
     config = configuration(tmp_path, *FORGETFUL, references=finished / "references")
     status, output = run(config, tmp_path / "output")
     assert status == 0, output
-    (warning,) = [line for line in output.splitlines() if "the checkpoint before it" in line]
+    (warning,) = [line for line in output.splitlines() if "using the previous checkpoint" in line]
     assert str(file) in warning
     assert "damaged" in warning or "gone" in warning
-    assert "going on from step 42, the last that was saved; later ones are done again (5" in output
+    assert "resuming from step 42, the last one saved; later steps are repeated (5" in output
     assert_same_run(copy, finished / "run")
 
 
@@ -115,7 +115,7 @@ def test_where_both_are_damaged_nothing_is_touched(copy: Path, damaged: str) -> 
     for file in files:
         flip(file, 5000)
     before = contents(copy)
-    with pytest.raises(ValueError, match=r"put back a copy, or delete every checkpoint") as caught:
+    with pytest.raises(ValueError, match=r"restore a copy, or delete every checkpoint") as caught:
         resume(copy)
     assert all(f"{file} is damaged" in str(caught.value) for file in files)
     assert contents(copy) == before
@@ -147,7 +147,7 @@ def test_a_checkpoint_executes_nothing(tmp_path: Path, copy: Path) -> None:
     buffer.write(hashlib.sha256(buffer.getbuffer()).digest())
     (copy / "last.ckpt").write_bytes(buffer.getbuffer())
     (copy / "previous.ckpt").write_bytes(buffer.getbuffer())
-    with pytest.raises(ValueError, match=r"last\.ckpt can not be read \(UnpicklingError\)"):
+    with pytest.raises(ValueError, match=r"last\.ckpt cannot be read \(UnpicklingError\)"):
         resume(copy)
     assert not witness.exists()
     torch.load(copy / "last.ckpt", weights_only=False)
@@ -172,7 +172,7 @@ def test_a_full_disk_leaves_the_old_checkpoints(tmp_path: Path) -> None:
         writer(tmp_path).save_checkpoint({"global_step": step}, path)
     before = contents(tmp_path)
     (tmp_path / "last.ckpt.partial").symlink_to("/dev/full")
-    with pytest.raises(OSError, match=r"No space left.*Make room.*last\.ckpt"):
+    with pytest.raises(OSError, match=r"No space left.*Free disk space.*last\.ckpt"):
         writer(tmp_path).save_checkpoint({"global_step": 3}, path)
     assert contents(tmp_path) == before
     assert not (tmp_path / "last.ckpt.partial").is_symlink()
@@ -183,8 +183,8 @@ def test_a_log_on_a_full_disk_names_itself(tmp_path: Path) -> None:
     (tmp_path / "steps.csv").symlink_to("/dev/full")
     log = RowLog(tmp_path / "steps.csv")
     log.append({"step": 1})
-    with pytest.raises(OSError, match=r"No space left.*Make room.*steps\.csv"):
+    with pytest.raises(OSError, match=r"No space left.*Free disk space.*steps\.csv"):
         log.flush()
-    with pytest.raises(OSError, match=r"Make room.*steps\.csv"):
+    with pytest.raises(OSError, match=r"Free disk space.*steps\.csv"):
         log.close()
     log.close()  # once reported, it is over

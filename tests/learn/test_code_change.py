@@ -60,8 +60,8 @@ def test_a_finished_run_of_changed_code_stays_and_that_is_said(copy: Path, caplo
     train(trained(copy, "continue"))
     assert contents(copy) == before
     (warning,) = [r.getMessage() for r in caplog.records if r.levelno == logging.WARNING]
-    assert "was made with commit aaaaaaaaaaaa, and this is commit bbbbbbbbbbbb" in warning
-    assert "run.on_code_change=restart makes it again" in warning
+    assert "was made with commit aaaaaaaaaaaa; this program is commit bbbbbbbbbbbb" in warning
+    assert "to repeat the run, set run.on_code_change=restart" in warning
 
 
 def test_the_same_code_is_not_worth_a_word(copy: Path, caplog, program) -> None:
@@ -96,7 +96,7 @@ def test_restarted_it_is_the_run_of_the_new_code_alone(copy: Path, state: str, c
     unbroken = copy.parent / f"{copy.name}-unbroken"
     train(trained(unbroken, "continue"))
     result = train(trained(copy, "restart"))
-    assert "it begins afresh, and what is there is deleted" in caplog.text
+    assert "the run is deleted and begins again" in caplog.text
     assert [v["commit"][0] for v in result["commits"]] == ["b"]
     assert_same(final_state(copy / "run"), final_state(unbroken / "run"))
     assert (copy / "run" / "chains.bin").read_bytes() == (
@@ -120,7 +120,7 @@ def test_an_interrupted_run_goes_on_with_a_warning(copy: Path, caplog) -> None:
     (copy / "run" / "result.json").unlink()
     result = train(trained(copy, "continue"))
     assert [v["commit"][0] for v in result["commits"]] == ["a", "b"]
-    assert "goes on with commit bbbbbbbbbbbb; up to step 20" in caplog.text
+    assert "resumes with commit bbbbbbbbbbbb; up to step 20" in caplog.text
 
 
 def test_another_word_is_refused() -> None:
@@ -135,6 +135,6 @@ def test_path_traced_runs_heed_it_too(tmp_path: Path, caplog, program) -> None:
     assert train(config)["commits"][0]["commit"] == "a" * 40
     program("b", "2")
     assert train(config)["commits"][0]["commit"] == "a" * 40
-    assert "is commit bbbbbbbbbbbb: run.on_code_change=restart makes it again" in caplog.text
+    assert "is commit bbbbbbbbbbbb: to repeat the run, set run.on_code_change=" in caplog.text
     config.run.on_code_change = "restart"
     assert [version["commit"] for version in train(config)["commits"]] == ["b" * 40]

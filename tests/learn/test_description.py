@@ -87,7 +87,7 @@ def test_samples_that_are_no_patches_say_so() -> None:
     class Others(Samples):
         pass
 
-    with pytest.raises(ValueError, match="Others makes samples of another kind"):
+    with pytest.raises(ValueError, match="Others does not make patches"):
         Others().glimpses(states(2), resolution=SIDE)
 
 

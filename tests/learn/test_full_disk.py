@@ -37,7 +37,7 @@ def assert_stopped(status: int, output: str, file: str) -> None:
     assert status == 1, output
     errors = [line for line in output.splitlines() if line.startswith("OSError")]
     assert file in errors[-1]
-    assert "Make room on the disk" in errors[-1]
+    assert "Free disk space" in errors[-1]
 
 
 def onto_full_device(log: type[GrowingFile], name: str) -> None:

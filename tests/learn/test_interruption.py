@@ -70,7 +70,7 @@ def test_runs_ended_by_sigterm_at_any_moment_end_like_an_unbroken_one(
     assert 143 in statuses
     status, output = run(config, tmp_path / "output")
     assert status == 0, output
-    assert "ended by SIGTERM; the same command goes on" in output
+    assert "ended by SIGTERM; to resume, repeat the command" in output
     assert_same_run(tmp_path / "run", unbroken / "run")
 
 
@@ -121,7 +121,7 @@ def test_sigterm_in_the_middle_of_anything(
     first = partial(at_call, owner, method, number, terminate_myself)
     status, output = run(config, tmp_path / "output", first=first)
     assert status == 143, output
-    assert "ended by SIGTERM; the same command goes on" in output
+    assert "ended by SIGTERM; to resume, repeat the command" in output
     assert not [*tmp_path.rglob("*.partial")]
     if step is None:
         assert len([*references.iterdir()]) == 4
@@ -153,7 +153,7 @@ def test_an_exit_within_a_step_goes_on_from_the_checkpoint_before(
     first = partial(at_call, owner, method, number, leave)
     status, output = run(config, tmp_path / "output", first=first)
     assert status == 3, output
-    assert "interrupted, and saved" not in output
+    assert "interrupted; saved" not in output
     saved = torch.load(tmp_path / "run" / "last.ckpt", weights_only=True)["global_step"]
     assert saved % 7 == 0
     status, output = run(config, tmp_path / "output")
@@ -177,8 +177,8 @@ def test_a_signal_ends_the_whole_sweep(tmp_path: Path, number: signal.Signals, s
     finally:
         process.kill()
     assert found_status == status, output
-    assert f"ended by {number.name}; the same command goes on" in output
-    assert "interrupted, and saved at step" in output
+    assert f"ended by {number.name}; to resume, repeat the command" in output
+    assert "interrupted; saved at step" in output
     assert_no_step_is_lost(found[0].parent)
     assert [folder.name for folder in tmp_path.rglob("seed=*")] == ["seed=0"]
 

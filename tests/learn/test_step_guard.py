@@ -128,7 +128,7 @@ def test_a_harmful_gradient_is_refused_and_named_and_training_goes_on(
     with caplog.at_level(logging.WARNING, logger="ngi"):
         trained = train(tmp_path, 12, gradient=at(6, value))
     assert trained.stream.counters.steps_refused == 1
-    assert "step 6 is not taken" in caplog.text
+    assert "step 6 is skipped" in caplog.text
     assert "network.output_layer.weight" in caplog.text
     assert torch.equal(trained.weights[5], trained.weights[4])
     assert all(not torch.equal(a, b) for a, b in pairwise(trained.weights[5:]))
@@ -200,7 +200,7 @@ def test_refusals_in_a_row_stop_the_run_with_what_does_the_last_one_again(tmp_pa
     def always(_: int, losses: Tensor) -> Tensor:
         return losses / 0
 
-    with pytest.raises(FloatingPointError, match=rf"the {REFUSED_IN_A_ROW}th in a row.*\.pt"):
+    with pytest.raises(FloatingPointError, match=rf"{REFUSED_IN_A_ROW}th skipped in a row.*\.pt"):
         train(tmp_path, 30, losses=always)
     report = torch.load(tmp_path / "refused_step.pt", weights_only=True)
     assert report["step"] == REFUSED_IN_A_ROW
@@ -237,7 +237,7 @@ def test_refusals_before_an_interruption_count(tmp_path: Path) -> None:
     for _ in range(REFUSED_IN_A_ROW - 1):
         before.admit(attempt)
     resumed.load_state_dict(before.state_dict())
-    with pytest.raises(FloatingPointError, match=f"the {REFUSED_IN_A_ROW}th in a row"):
+    with pytest.raises(FloatingPointError, match=f"the {REFUSED_IN_A_ROW}th skipped in a row"):
         resumed.admit(attempt)
 
 
@@ -309,7 +309,7 @@ def test_patches_that_are_not_finite_are_replaced_and_named(
 
 
 def test_a_renderer_that_gives_nothing_finite_stops_the_run(tmp_path: Path) -> None:
-    with pytest.raises(FloatingPointError, match="9 batches before: the renderer gives no usable"):
+    with pytest.raises(FloatingPointError, match="9 batches before: the renderer cannot make"):
         train(tmp_path, 5, renderer=BrokenRenderer(calls=None))
 
 

@@ -142,7 +142,7 @@ def test_what_fails_is_said_once(watch, caplog, tmp_path: Path, where, error) ->
     (record,) = caplog.records
     assert record.levelno == logging.WARNING
     assert f"Weights & Biases failed ({type(error).__name__}: {error})" in record.message
-    assert f"rows are missing there, but all are in the files of {tmp_path}" in record.message
+    assert f"it lacks some rows; all of them are in the files of {tmp_path}" in record.message
     assert wandb.calls[-1].split()[0] == where, "nothing is called after that"
     assert [call.split()[0] for call in wandb.calls].count(where) == 1
 
@@ -163,8 +163,8 @@ def test_what_hangs_holds_nothing_up(watch, caplog, monkeypatch) -> None:
     assert logged - begun < 2
     assert ended - logged < 5
     said = caplog.text
-    assert "takes no more calls, 50 of them wait" in said
-    assert "is left behind" in said
+    assert "takes no more calls: 50 are waiting already" in said
+    assert "the run ends without it" in said
     lost = re.search(r"has lost (\d+) calls", said)
     assert lost is not None
     assert 1940 <= int(lost[1]) <= 1960

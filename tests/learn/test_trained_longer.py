@@ -94,7 +94,7 @@ def test_without_a_checkpoint_it_stays_as_it_is(tmp_path: Path) -> None:
     for checkpoint in folder.glob("*.ckpt"):
         checkpoint.unlink()
     before = {file: file.read_bytes() for file in folder.glob("*.*") if file.name != ".lock"}
-    with pytest.raises(ValueError, match=r"no checkpoint in it; put last\.ckpt back, or choose"):
+    with pytest.raises(ValueError, match=r"no checkpoint in it; restore last\.ckpt .*, or choose"):
         train(run(tmp_path, 60, *WSD))
     assert {file: file.read_bytes() for file in before} == before
     assert (folder / "result.json") in before

@@ -177,7 +177,7 @@ def test_the_releases_loss() -> None:
         ({"relative_weight": -3}, "loss.relative_weight is -3"),
         ({"l1_weight": 0, "dssim_weight": 0}, "all weights of the loss are 0"),
         ({"window_size": 10}, "loss.window_size is 10"),
-        ({"mirrored": True, "release_layout": True}, "loss.mirrored: true.*zeros"),
+        ({"mirrored": True, "release_layout": True}, "loss.mirrored and loss.release.*zeros"),
         ({"sigma": 0}, "loss.sigma is 0"),
         ({"data_range": -1}, "loss.data_range is -1"),
         ({"relative_offset": 0}, "loss.relative_offset is 0"),

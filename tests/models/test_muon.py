@@ -203,7 +203,7 @@ def test_one_part_may_have_nothing_to_do(shape: tuple[int, ...]) -> None:
         ({"momentum": -0.1}, "optimizer.momentum: -0.1"),
         ({"clip_norm": 0.0}, "optimizer.clip_norm: 0.0"),
         ({"clip_norm": float("nan")}, "optimizer.clip_norm: nan"),
-        ({"lr": -1.0}, "optimizer.lr: -1.0 is no learning rate"),
+        ({"lr": -1.0}, "optimizer.lr: -1.0; expected at least 0"),
         ({"adam_lr": float("nan")}, "optimizer.adam_lr: nan"),
     ],
 )

@@ -181,7 +181,7 @@ def test_other_optimisers_and_models_are_refused(make_model, make_batch) -> None
     with pytest.raises(ValueError, match="does not hold every parameter"):
         step_norms(model, torch.optim.Adam(model.hidden.parameters()), batch)
     model.extra = nn.Linear(2, 2)
-    with pytest.raises(TypeError, match=r"'extra.weight' belongs to no PatchLinear"):
+    with pytest.raises(TypeError, match=r"'extra.weight' belongs to neither a PatchLinear"):
         step_norms(model, adam(model), batch)
 
 

@@ -62,7 +62,7 @@ def test_where_a_camera_is_that_is_moved_otherwise_is_not_said_wrongly(
     made = renderer(box_folder, tmp_path / "box", *view, MOVED, dimensions=dimensions)
     vectors = torch.rand(2, made.dimensions)
     for asked in (made.cameras, made.projections):
-        with pytest.raises(ValueError, match="moved by other variables than look_at"):
+        with pytest.raises(ValueError, match="variables other than look_at and camera_path move"):
             asked(vectors)
 
 

@@ -275,7 +275,7 @@ def test_bad_construction(box_folder, tmp_path) -> None:
     (tmp_path / "scene.xml").write_text(
         xml.replace(height, f'{height}<integer name="crop_height" value="16"/>')
     )
-    with pytest.raises(ValueError, match="the film shows a part of its picture"):
+    with pytest.raises(ValueError, match="the film is cropped"):
         MitsubaRenderer(scene=read_scene(tmp_path), backend="scalar")
     (tmp_path / "scene.xml").write_text(xml.replace('type="roughplastic"', 'type="pplastic"'))
     named = "BSDF 'clay' is a .*; use one of diffuse, conductor, .*, roughplastic, principled, or"
@@ -294,5 +294,5 @@ def test_a_camera_in_a_medium_is_refused(box_folder, tmp_path, before, inside) -
     text = (tmp_path / "scene.xml").read_text()
     assert sensor in text
     (tmp_path / "scene.xml").write_text(text.replace(sensor, f"{before}{sensor}{inside}"))
-    with pytest.raises(ValueError, match=r"scene\.xml, line 7: the camera stands in a medium"):
+    with pytest.raises(ValueError, match=r"scene\.xml, line 7: the camera is in a medium"):
         MitsubaRenderer(scene=read_scene(tmp_path), backend="scalar")

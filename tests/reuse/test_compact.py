@@ -86,5 +86,5 @@ def test_buffers_of_another_layout_are_rejected(make_patches) -> None:
 def test_patches_of_unequal_number_are_rejected(make_patches) -> None:
     patches = make_patches(3)
     patches.log_radiance.resize_(2, 4, 4, 3)
-    with pytest.raises(ValueError, match="unequal number"):
+    with pytest.raises(ValueError, match="differ in number"):
         CompactPatches.compress(patches, LAYOUT)

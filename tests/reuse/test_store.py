@@ -176,7 +176,7 @@ def test_bad_input_is_named_and_changes_nothing(make_patches) -> None:
     with pytest.raises(ValueError, match=r"scene_vector: shape \[5\]"):
         store.add(make_patches(4, dimensions=5))
     patches = make_patches(4)
-    with pytest.raises(ValueError, match="unequal number"):
+    with pytest.raises(ValueError, match="differ in number"):
         store.add(replace(patches, position=patches.position[:3]))
     after = store.state_dict()
     for name in ("ids", "losses", "waiting"):

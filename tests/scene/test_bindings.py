@@ -140,7 +140,7 @@ def other_mesh(folder) -> None:
         ({"object": "ball", **RADIANCE}, "'ball' .* name an emitter", {}),
         (
             {"object": "back", "property": "intensity", "minimum": 0, "maximum": 2},
-            "back.*scale of 'back' is no emitter's; name an emitter",
+            "back.*scale of 'back' is not an emitter's; name an emitter",
             {"edit": bumpy},
         ),
         ({"object": "picture", **ALBEDO}, "name a BSDF whose reflectance is given as <rgb>", {}),
@@ -165,7 +165,7 @@ def other_mesh(folder) -> None:
             r"'white' \(TwoSided.*\) has several .*brdf_0.*brdf_1.*; give an id to the part",
             {"edit": two_sides},
         ),
-        ({"object": "paint", **TURN}, "'paint' .* it has no place that could vary", {}),
+        ({"object": "paint", **TURN}, "'paint' .* its place cannot vary", {}),
         (
             {"object": "wedge_mesh", **MOVE},
             "wedge_mesh.* a group that an instance turns or scales .*; name the instances",
@@ -179,7 +179,7 @@ def other_mesh(folder) -> None:
             {"scene": "field"},
         ),
         ({"object": "sky", **AIM}, r"'sky' is a EnvironmentMapEmitter; name one of \['Dir", FIELD),
-        ({"object": "lamp", **MOVE}, "'lamp' .* a lamp's is its shape's", {}),
+        ({"object": "lamp", **MOVE}, "'lamp' .* to move a lamp, name its shape", {}),
         ({"object": "sky", **MOVE}, "'sky' .* infinitely far away.*vary its rotation", FIELD),
         (
             {"object": "sky", "property": "scale", "minimum": 1, "maximum": 2},
@@ -188,7 +188,7 @@ def other_mesh(folder) -> None:
         ),
         (
             {"object": "other", **LOOK},
-            "'other' is not rendered, but the first sensor of the file, 'camera', is",
+            "'other' is not rendered: only the first sensor of the file, 'camera', is",
             {"edit": second_camera},
         ),
         ({"object": "other", **WIDE}, "the first sensor of the file is; name", {"edit": nameless}),

@@ -114,7 +114,7 @@ def test_hash_follows_named_files(box) -> None:
             "samples_per_pixel: yes",
             "samples_per_pixel is True; expected int",
         ),
-        ("scene: scene.xml", "scene: scen.xml", "scene names 'scen.xml', which is not there"),
+        ("scene: scene.xml", "scene: scen.xml", "scene names 'scen.xml', which does not exist"),
         ("maximum: [1, 2, 1]", "maximum: [1, 0, 1]", r"bounds.maximum is \[1.0, 0.0, 1.0\]"),
         ("property: albedo", "property: albdo", "property is 'albdo'; choose one of .*'albedo'"),
         (

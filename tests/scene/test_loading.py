@@ -58,7 +58,7 @@ def test_both_places_of_what_is_there_twice(tmp_path: Path) -> None:
     file = tmp_path / "scene.xml"
     radius = '<float name="radius" value="1"/>'
     file.write_text(SCENE.format(wrong=f"{radius}\n{radius}"))
-    with pytest.raises(ValueError, match=rf"line 6: .* stands in {file}, line 5 too; take one"):
+    with pytest.raises(ValueError, match=rf"line 6: .*{file}, line 5 has the same name"):
         load(read_scene_file(file))
     file.write_text(SCENE.format(wrong='<bsdf type="diffuse" id="ball"/>'))
     with pytest.raises(ValueError, match=r"duplicate ID: .ball.") as error:

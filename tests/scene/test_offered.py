@@ -251,9 +251,9 @@ REFUSALS = sorted(
 
 
 OF_REFUSED_PLUGINS = [
-    ("opacity", "the buffers do not know the albedo and roughness of such a BSDF"),
-    ("focus_distance", "a camera is a pinhole here"),
-    ("sigma_t", "the buffers tell of surfaces only, not of a medium"),
+    ("opacity", "the buffers cannot represent the albedo and roughness of such a BSDF"),
+    ("focus_distance", "only pinhole cameras are supported"),
+    ("sigma_t", "the buffers represent surfaces only, not media"),
 ]
 
 

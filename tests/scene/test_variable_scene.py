@@ -124,7 +124,7 @@ def test_what_was_broken_off_is_written_again(scene, monkeypatch) -> None:
             r"'left_wall' \(SmoothDiffuse\) has no parameter alpha",
         ),
         ("object: lamp", "object: ball", "'ball' .* name an emitter"),
-        ("object: figure, ", "object: metal, ", "it has no place that could vary"),
+        ("object: figure, ", "object: metal, ", "its place cannot vary"),
     ],
 )
 @pytest.mark.usefixtures("scene")

@@ -52,13 +52,13 @@ def test_every_run_of_a_small_study_is_done_once_and_repeats(tmp_path: Path) -> 
     again = pd.read_csv(campaign.run_all(configuration(tmp_path / "a")))
     pd.testing.assert_frame_equal(first, again)
     assert [file.stat().st_mtime_ns for file in files[2:]] == before[2:]
-    with pytest.raises(ValueError, match="made with another study"):
+    with pytest.raises(ValueError, match="made with a different study"):
         campaign.run_all(configuration(tmp_path / "a", "ceiling.rounds=4"))
-    with pytest.raises(ValueError, match="made with another configuration"):
+    with pytest.raises(ValueError, match="made with a different configuration"):
         campaign.run_all(configuration(tmp_path / "a", "model.hidden_layers=4"))
-    with pytest.raises(ValueError, match="made with another protocol"):
+    with pytest.raises(ValueError, match="made with a different protocol"):
         campaign.run_all(configuration(tmp_path / "a", f"{PROTOCOL}.resolution=48"))
-    with pytest.raises(ValueError, match="made with another choice oracle_weighted"):
+    with pytest.raises(ValueError, match="made with a different choice oracle_weighted"):
         campaign.run_all(
             configuration(tmp_path / "a", "ceiling.choices.oracle_weighted.uniform_share=0.5")
         )
@@ -73,7 +73,7 @@ def test_who_renders_a_scene_and_where_it_lies_makes_no_other_study(tmp_path: Pa
         campaign.claim(tmp_path, config, scene="a hash", backend="a backend")
     found = json.loads((tmp_path / "provenance.json").read_text())
     assert "scene" not in found["configuration"]["renderer"]
-    with pytest.raises(ValueError, match="made with another scene"):
+    with pytest.raises(ValueError, match="made with a different scene"):
         campaign.claim(tmp_path, here, scene="another hash", backend="a backend")
 
 

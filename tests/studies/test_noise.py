@@ -38,4 +38,4 @@ def test_a_network_that_knows_the_truth_keeps_what_is_left_of_the_noise(tmp_path
 def test_a_run_that_is_not_there_is_named(tmp_path: Path) -> None:
     status, output = noise(tmp_path)
     assert status != 0
-    assert "run/last.ckpt is not there" in output
+    assert "run/last.ckpt does not exist" in output

@@ -304,7 +304,7 @@ def test_names_that_yaml_takes_for_something_else_are_quoted(room, name) -> None
     ("edit", "message"),
     [
         (lambda folder: (folder / "scene.yaml").write_text("name: ["), "broken YAML"),
-        (lambda folder: (folder / "scene.xml").unlink(), "names 'scene.xml', which is not there"),
+        (lambda folder: (folder / "scene.xml").unlink(), "names 'scene.xml', which does not exist"),
         (lambda folder: shutil.rmtree(folder), "no scene of this name"),
     ],
 )

@@ -284,7 +284,7 @@ def test_a_file_that_differs_is_not_written(
     monkeypatch.setattr("ngi.view.network_file.network_file", lambda *_: exported.read_bytes())
     out = trained / "refused.onnx"
     assert export.main([f"run={trained / 'run'}", f"out={out}"]) == 2
-    assert "differs from the one of the run by" in capsys.readouterr().err
+    assert "differs from the run's by" in capsys.readouterr().err
     assert not list(trained.glob("refused*"))
 
 

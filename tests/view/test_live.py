@@ -120,7 +120,7 @@ def test_a_run_with_a_page_trains_as_one_without(tmp_path: Path) -> None:
         port = probe.getsockname()[1]
     status, output = run(tmp_path, "run.folder=seen", "viewer=true", f"run.viewer_port={port}")
     assert status == 0, output
-    assert f"http://127.0.0.1:{port} shows the training" in output
+    assert f"watch the training at http://127.0.0.1:{port}" in output
     status, output = run(tmp_path, "run.folder=unseen")
     assert status == 0, output
     checkpoints = [
@@ -164,7 +164,7 @@ def test_a_training_goes_on_when_its_picture_fails(
     page = ("viewer=true", "run.viewer_port=0", "budget.steps=3")
     train(run_config(*SMALL, *page, f"run.folder={tmp_path / 'run'}"))
     assert (tmp_path / "run" / "result.json").exists()
-    assert "the page's picture of the training failed; the training goes on" in caplog.text
+    assert "the viewer could not draw the training; training continues" in caplog.text
 
 
 def test_two_rotations_of_one_object_are_two_axes(tmp_path: Path) -> None:

@@ -60,5 +60,5 @@ def test_what_cannot_be_packed_is_named(folder, capsys) -> None:
     (folder / "begun" / "settings.json").write_text('{"path_tracing": {}}')
     (folder / "begun" / "result.json").write_text("{}")
     assert main([f"run={folder}/begun", f"out={folder}/new"]) == 2
-    assert "has no network: path tracing took its place" in capsys.readouterr().err
+    assert "has no network: it is a path tracing run" in capsys.readouterr().err
     assert not (folder / "new").exists()

@@ -201,7 +201,7 @@ def test_a_picture_that_fails_is_told_once_and_the_next_one_made(
     studio.open("a", Wish(Place((0.9, 0, 0), 32), Screen(show)), pictures.append, told.append)
     settled(studio)
     assert [str(error) for error in told] == ["out of memory"]
-    assert "a picture of the page failed" in caplog.text
+    assert "the viewer could not make a picture" in caplog.text
     studio.change("a", Wish(Place(V, 32), Screen()))
     settled(studio)
     assert pictures[-1].full

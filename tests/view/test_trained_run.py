@@ -46,7 +46,7 @@ def test_edges_can_be_supersampled_of_a_run_that_has_them_asked_for_once(tmp_pat
 
 def test_a_network_of_whole_images_cannot_be_asked_for_quarters() -> None:
     settings = {"data": {"_target_": "ngi.methods.cnsr.ObservationSets", "observations": 3}}
-    with pytest.raises(ValueError, match="whole images of ObservationSets"):
+    with pytest.raises(ValueError, match="whole images from ObservationSets"):
         make_samples(settings, MovingCamera(patch_size=16), supersampled_edges=True)
 
 

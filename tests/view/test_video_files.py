@@ -62,9 +62,9 @@ def test_what_another_video_measured_is_not_replaced(
     content = figures.read_text()
     assert main([f"run={tmp_path}", *options]) == 2
     assert capsys.readouterr().err == (
-        f"out: {figures} holds what was measured with {before}, and would be replaced by a video "
-        f"with {now.format(here=tmp_path)}; give this one another name with out=…, or delete that "
-        "one\n"
+        f"out: {figures} holds measurements with {before}; a video with "
+        f"{now.format(here=tmp_path)} would replace them; give this video another name with out=…, "
+        "or delete that file\n"
     )
     assert figures.read_text() == content
 
@@ -83,7 +83,7 @@ def test_nor_is_that_of_another_path_in_the_same_file(
         figures.write_text(json.dumps({**content, "key_frames": key_frames}))
         assert main(words) == 2
         said = capsys.readouterr().err
-        assert ("holds what was measured with key_frames=" in said) == (key_frames[0:3] == "012")
+        assert ("holds measurements with key_frames=" in said) == (key_frames[0:3] == "012")
 
 
 @pytest.mark.parametrize(
@@ -125,5 +125,5 @@ def test_what_is_no_videos_is_not_replaced(
     figures = tmp_path / "video_camera.json"
     figures.write_text(content)
     assert main([f"run={tmp_path}"]) == 2
-    assert f"out: {figures}, where the figures would be written" in capsys.readouterr().err
+    assert f"out: {figures}, the file for the measurements" in capsys.readouterr().err
     assert figures.read_text() == content

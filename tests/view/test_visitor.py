@@ -259,7 +259,7 @@ def test_the_command_traces_as_many_paths_as_are_seen(
 def test_no_command_makes_the_picture_of_a_buffer(browser: Browser) -> None:
     made = visitor(browser)
     made._panel._show.value = "albedo"
-    assert command(made) == "no command makes pictures of buffers"
+    assert command(made) == "ngi render does not render buffers"
 
 
 def command(made: Visitor) -> str:
