@@ -204,7 +204,10 @@ def test_pixels_that_are_no_numbers_are_counted_exactly(run: Path, capsys) -> No
         ("none kept", "run has no linear pictures: run.linear_megabytes was too small"),
         ("packed", "run holds only the network of a run, without its pictures"),
         ("gone", "hard_02_prediction.exr cannot be read"),
-        ("size", "hard_02_prediction.exr and its reference are of 8 x 8 and 33 x 33 pixels"),
+        (
+            "size",
+            "02_prediction.exr and its reference have different sizes, 8 x 8 and 33 x 33",
+        ),
         ("protocol", "in this version of the program the same settings give"),
         ("damaged", "result.json is damaged (JSONDecodeError: Expecting value"),
         ("older", "the same settings give no protocol; use the version that made the run"),

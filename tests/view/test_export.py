@@ -293,7 +293,7 @@ def test_a_file_that_differs_is_not_written(
     [
         (("run=elsewhere",), "elsewhere/settings.json: no such file"),
         (("run=run", "out=network.pt2"), "'network.pt2' does not end with .onnx"),
-        (("run=run", "out=nowhere/network.onnx"), "no folder nowhere"),
+        (("run=run", "out=nowhere/network.onnx"), "the folder nowhere does not exist"),
         (("out=network.onnx",), "give run="),
         (("run=run", "colour=red"), "'colour' is no option"),
     ],

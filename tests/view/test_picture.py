@@ -135,7 +135,7 @@ def test_exr_files_hold_linear_radiance(tmp_path: Path) -> None:
         (("v=[0.5]",), "expected 3 numbers from 0 to 1"),
         (("hard_frame=10",), "there are 0 to 9"),
         (("out=picture.jpg",), ".png"),
-        (("out=nowhere/picture.png",), "no folder nowhere"),
+        (("out=nowhere/picture.png",), "the folder nowhere does not exist"),
         (("resolution=0",), "at least 1"),
         (("resolution=31", "reference=4"), "resolution: 31: the metrics"),
         (("resolution=many",), "'resolution=many' is wrong: input should be a valid integer"),

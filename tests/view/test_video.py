@@ -229,7 +229,7 @@ def test_pixels_that_a_path_made_nan_come_from_the_other_half(
         (("path=broken.txt",), "path: broken.txt is not a JSON file"),
         (("path=static", "hard_frame=10"), "hard_frame: 10; there are 0 to 9"),
         (("out=video.avi",), "out: 'video.avi' does not end with .mp4 or .webp"),
-        (("out=nowhere/video.mp4",), "no folder nowhere"),
+        (("out=nowhere/video.mp4",), "the folder nowhere does not exist"),
         (("resolution=0",), "at least 1"),
         (("frames_per_second=0",), "at least 1"),
         (("reference=7",), "reference: 7; it has to be an even number"),

@@ -327,7 +327,7 @@ def test_where_reset_view_leads_is_where_a_page_begins() -> None:
 
 
 def test_pictures_too_small_for_the_metrics_are_shown_without(browser: Browser) -> None:
-    for side, said in ((8, "metrics take 11 pixels a side"), (16, "MAPE")):
+    for side, said in ((8, "metrics need at least 11 pixels a side"), (16, "MAPE")):
         picture = torch.rand(side, side, 3, generator=torch.Generator().manual_seed(0))
         view: Any = SimpleNamespace(prediction=picture, reference=picture / 2, noise=None)
         shown: Any = SimpleNamespace(view=view)
