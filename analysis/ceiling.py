@@ -170,7 +170,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Writes the tables; returns the exit status, 1 where there is nothing to read."""
     parser = argparse.ArgumentParser(
         prog="python -m analysis.ceiling",
-        description="What an oracle gains against uniform choice in the runs of "
+        description="Reports what an oracle gains over uniform choice in the runs of "
         "`python -m ngi.studies.ceiling` below FOLDER: runs.csv, differences.csv, tables.md.",
     )
     parser.add_argument("folder", metavar="FOLDER", type=Path)

@@ -34,7 +34,7 @@ def comparison_warnings(runs: Sequence[Run]) -> list[str]:
     if diverged := [str(run.folder) for run in runs if any(map(run.diverged, SETS))]:
         warnings.append(
             f"{len(diverged)} run(s) ended with errors that are not finite, and so do means over "
-            f"their seeds; curves and times to equal error are without them: {', '.join(diverged)}"
+            f"their seeds; curves and times to equal error leave them out: {', '.join(diverged)}"
         )
     for scene in sorted({run.scene for run in runs}):
         trained = [run for run in runs if run.scene == scene and run.result["steps"]]
@@ -44,7 +44,7 @@ def comparison_warnings(runs: Sequence[Run]) -> list[str]:
         shortest, longest = min(times, key=times.__getitem__), max(times, key=times.__getitem__)
         if times[longest] > (1 + MOST_TIME_APART) * times[shortest]:
             warnings.append(
-                f"{scene}: the runs were not given the same time: {_shown(times[shortest])} in "
+                f"{scene}: the runs had different run times: {_shown(times[shortest])} in "
                 f"{shortest}, {_shown(times[longest])} in {longest}"
             )
     if changed := [r.folder for r in runs if any(v.get("dirty") for v in r.versions)]:

@@ -78,7 +78,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point of `python -m analysis.endurance`."""
     parser = argparse.ArgumentParser(
         prog="python -m analysis.endurance",
-        description="Says of a long run how memory, open files, disk and speed changed over it.",
+        description="Reports how memory, open files, disk and speed changed over a long run.",
     )
     parser.add_argument("run", type=Path, help="a run's folder, which holds metrics.csv")
     folder = parser.parse_args(arguments).run

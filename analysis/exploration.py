@@ -67,7 +67,7 @@ def exploration_table(runs: Sequence[Run]) -> Table:
                 names = (Cell(scene), Cell(title(method)), Cell(str(len(numbers))))
                 rows.append((*names, *cells))
     heading = (
-        "What the chains did: parts of the proposals accepted, lifetime of a state in proposals, "
+        "What the chains did: share of proposals accepted, lifetime of a state in proposals, "
         "effective sample size per 1,000 states of a chain, and reuse at the end"
     )
     return Table(heading, ("scene", "method", "n", *COLUMNS.values()), tuple(rows), 2)

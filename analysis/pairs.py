@@ -95,13 +95,13 @@ def ways_left_out(runs: Sequence[Run]) -> list[str]:
             ways.setdefault((run.scene, method), set()).add(_way(run))
     budgets = sorted({str(run.label["budget"]) for run in runs if run.label.get("method")})
     several = (
-        f"runs of the budgets {', '.join(budgets)}: each claim is judged by those of one budget "
-        "alone, that in which most of its scenes have all of its methods"
+        f"runs with different budgets, {', '.join(budgets)}: each claim is judged by the runs of "
+        "one budget, the one in which most of its scenes have all of its methods"
     )
     return [several] * (len(budgets) > 1) + [
         f"{scene}: {method} was run in {len(found)} ways "
         f"({'; '.join(' '.join(way) for way in sorted(found, key=lambda w: (len(w), w)))}); claims "
-        "are judged by runs of one way alone, that in which the methods share most seeds"
+        "are judged by runs of one way only, the one in which the methods share most seeds"
         for (scene, method), found in sorted(ways.items())
         if len(found) > 1
     ]

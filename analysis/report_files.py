@@ -112,7 +112,7 @@ def _baseline(asked_for: str | None, runs: Sequence[Run]) -> str:
         return BASELINE
     if not any(is_baseline(run.method, baseline=asked_for) for run in runs):
         there = ", ".join(f"'{method}'" for method in methods_in_order(runs))
-        raise ValueError(f"--baseline {asked_for}: there is no such run; there are {there}")
+        raise ValueError(f"--baseline {asked_for}: no run has this method; there are {there}")
     return asked_for
 
 
@@ -166,13 +166,13 @@ def _notes(runs: Sequence[Run], claims: Sequence[ClaimResult]) -> list[str]:
         "±: half width of the 95 % interval of the mean over n seeds (Student's t); "
         "none for one seed.",
         f"{REFERENCE_NOISE}: what a perfect prediction would score against these references; for "
-        "DSSIM and LPIPS a lower bound, right in order of magnitude.",
+        "DSSIM and LPIPS a lower bound of the right order of magnitude.",
     ]
     if judged := sum(claim.verdict is not Verdict.NOT_RUN for claim in claims):
         notes.append(
-            f"Claims judged: {judged}. Each is refuted by one primary test alone, named "
-            "beforehand, and reproduced where all its tests say so, at 95 % each. This is not "
-            f"corrected for their number: were all untrue, {0.025 * judged:.2f} of them would be "
+            f"Claims judged: {judged}. Only a claim's primary test, named beforehand, can refute "
+            "it; it is reproduced if all its tests say so, at 95 % each. There is no correction "
+            f"for multiple tests: if all claims were untrue, {0.025 * judged:.2f} of them would be "
             "called reproduced by chance."
         )
     fields = differing_fields(runs)

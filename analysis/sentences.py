@@ -41,7 +41,7 @@ def in_words(
             sentences.append(f"There are no runs yet of {better} and {worse} with the same seeds.")
     sentences += [_finding_in_words(finding) for finding in findings]
     if claim.test and not findings:
-        sentences.append("What else would decide was not measured in these runs.")
+        sentences.append("The other deciding quantity was not measured in these runs.")
     return " ".join(sentences)
 
 
@@ -52,7 +52,7 @@ def _comparison_in_words(results: Sequence[ComparisonResult], claimed: int) -> s
     where = f"on {decisive.scene}" if len(scenes) == 1 else f"on {len(scenes)} scenes"
     text = f"{better} against {worse} {where}: "
     if math.isnan(decisive.decisive.effect_percent):
-        return f"{text[0].upper()}{text[1:]}errors that are not finite forbid a comparison."
+        return f"{text[0].upper()}{text[1:]}no comparison, since some errors are not finite."
     text += _difference(decisive.decisive)
     if len(scenes) > 1:
         fewer = sum(result.decisive.effect_percent < 0 for result in scenes)
@@ -83,7 +83,7 @@ def _consequence(result: ComparisonResult) -> str:
     many = result.seeds_needed >= MORE_THAN_MOST_SEEDS
     seeds = "more than 100 seeds" if many else f"{result.seeds_needed} seeds"
     if result.scene == ALL_SCENES:
-        return f"; if the differences seen are the true ones, {seeds} would decide every scene"
+        return f"; if the measured differences are the true ones, {seeds} would decide every scene"
     return f"; if that is the true difference, {seeds} would show it"
 
 

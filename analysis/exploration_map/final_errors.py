@@ -126,7 +126,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         "--against",
         metavar="FOLDER",
         type=Path,
-        help="with whose uniform sampling all are compared; by default each folder's own",
+        help="folder whose uniform sampling is the baseline; by default each folder's own",
     )
     arguments = parser.parse_args(argv)
     runs = [read_table(folder) for folder in arguments.folders]

@@ -67,7 +67,7 @@ def starter_yaml(document: SceneFile, scene: mi.Scene, found: list[Candidate]) -
         raise ValueError(f"{document.path}: no object with an id can vary; give ids to its objects")
     count = scene.sensors()[0].sampler().sample_count()
     lines = [
-        "# What varies. Adjust the ranges, take the # away from what should vary, delete the rest.",
+        "# What varies. Adjust the ranges, uncomment what should vary, delete the rest.",
         f"# Check it: ngi describe {shlex.quote(str(document.path.parent))}",
         f"name: {_word(folder_name)}",
         f"scene: {_word(document.path.name)}",
@@ -78,8 +78,8 @@ def starter_yaml(document: SceneFile, scene: mi.Scene, found: list[Candidate]) -
         f"bounds: {{minimum: {_list(low)}, maximum: {_list(high)}}}",
         "variables:",
         *(f"  {'' if c is active else '# '}- {c.entry}" for c in found),
-        "# camera_path: key frames of v; hard_frames: ten v to test on. Left out, they are spread",
-        "# evenly over the hypercube.",
+        "# camera_path: key frames of v; hard_frames: ten v to test on. If left out, they are",
+        "# spread evenly over the hypercube.",
     ]
     return "\n".join(lines) + "\n"
 

@@ -51,7 +51,7 @@ def describe(options: DescribeOptions) -> int:
         description = read_release(path)
     text, problems = describe_scene(description)
     print(text)
-    print("\ncamera:" + ("  in free air wherever it can be" if not problems else ""))
+    print("\ncamera:" + ("  in free space wherever it can move" if not problems else ""))
     for problem in problems:
         print(f"  error: {problem}")
     return 1 if problems else 0

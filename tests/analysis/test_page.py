@@ -153,7 +153,7 @@ def test_claims_are_told_in_words_with_their_evidence(claims) -> None:
     for result in (preconditioning, resolution):
         for text in (result.claim.statement, result.claim.source, result.sentence):
             assert text in claims.page.text
-    table = claims.page.tables["What the paper claims, and what came out"]
+    table = claims.page.tables["What the paper claims, and what these runs show"]
     row = table[table["claim"].str.startswith("Position preconditioning")].iloc[0]
     effect = preconditioning.comparisons[0].decisive
     assert row["difference"] == (

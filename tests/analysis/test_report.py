@@ -141,7 +141,7 @@ def test_doubtful_comparisons_are_a_warning(one_scene, make_run, capsys) -> None
     assert main([str(one_scene)]) == 0
     printed = capsys.readouterr().err
     written = (one_scene / "report" / "results.md").read_text()
-    times = f"mirror: the runs were not given the same time: 240 s in {one_scene}"
+    times = f"mirror: the runs had different run times: 240 s in {one_scene}"
     machines = "the runs come from different machines: "
     for line in (times, machines):
         assert f"warning: {line}" in printed
@@ -156,7 +156,7 @@ def test_short_times_are_told_apart(make_run, tmp_path, capsys) -> None:
         make_run(sampler=sampler, change=lambda result, t=seconds: result.update(run_seconds=t))
     assert main([str(tmp_path / "runs")]) == 0
     told = capsys.readouterr().err
-    assert "the same time: 4.6 s in" in told
+    assert "different run times: 4.6 s in" in told
     assert ", 5.3 s in" in told
 
 

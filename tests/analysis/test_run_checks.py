@@ -35,7 +35,7 @@ DAMAGE: list[tuple[str, Callable[[Path], Any], str]] = [
     ("metrics.csv", cut_by_a_line, "metrics.csv is damaged: it has"),
     ("chains.bin", cut_by_a_record, "chains.bin is damaged: it has"),
     ("chains.bin", changed_in_place, "chains.bin is damaged: its checksum"),
-    ("chains.bin", Path.unlink, "chains.bin is gone"),
+    ("chains.bin", Path.unlink, "chains.bin is missing"),
     ("steps.csv", lambda file: file.write_text(""), "steps.csv is damaged: it has 0 bytes"),
 ]
 

@@ -162,7 +162,7 @@ def test_that_budget_counts_which_most_scenes_share(make_method, tmp_path) -> No
     assert result.verdict is Verdict.REPRODUCED
     assert result.comparisons[1].decisive.effect_percent == pytest.approx(-50, abs=5)
     lines = ways_left_out(find_runs(tmp_path)[0])
-    assert lines[0].startswith("runs of the budgets hour, small: each claim is judged by those")
+    assert lines[0].startswith("runs with different budgets, hour, small: each claim is judged")
 
 
 def test_of_two_budgets_with_as_many_scenes_that_with_more_seeds_counts(

@@ -30,7 +30,7 @@ def test_of_two_limits_the_one_used_up_first_counts(
 
 @pytest.mark.parametrize("steps", [0, -3])
 def test_no_steps_are_no_budget(steps: int) -> None:
-    with pytest.raises(ValueError, match=rf"budget\.steps: {steps} "):
+    with pytest.raises(ValueError, match=rf"budget\.steps: {steps}; "):
         Budget(steps=steps)
 
 

@@ -164,7 +164,7 @@ def test_numbers_out_of_range_are_refused(arguments: dict[str, float], named: st
 
 def test_more_draws_than_candidates_and_negative_values_are_refused() -> None:
     importance = Importance(uniform_share=0.5)
-    with pytest.raises(ValueError, match="5 of 4"):
+    with pytest.raises(ValueError, match="only 4 candidates"):
         importance.draw(VALUES, 5, torch.Generator())
     with pytest.raises(ValueError, match="-1"):
         importance.probabilities(torch.tensor([1.0, -1.0]))

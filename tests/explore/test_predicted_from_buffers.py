@@ -167,7 +167,9 @@ def test_before_a_network_knows_anything_states_are_uniform() -> None:
 
 @pytest.mark.parametrize("uniform_first", [2 * CHAINS - 1, 257])
 def test_a_beginning_that_is_too_short_or_forgotten_is_refused(uniform_first: int) -> None:
-    named = rf"sampler\.uniform_first: {uniform_first}: give at least 8, .*sampler.memory: 256\)"
+    named = (
+        rf"sampler\.uniform_first: {uniform_first}: give at least 8, .*sampler.memory, which is 256"
+    )
     with pytest.raises(ValueError, match=named):
         looking(uniform_first=uniform_first)
 

@@ -94,7 +94,7 @@ def test_a_scene_folder(capsys) -> None:
     assert "outgoing  kept: it differs from pixel to pixel" in text
     assert "roughness  kept: a variable changes it" in text
     assert "moves: ball, figure\n" in text
-    assert "camera:  in free air" in text
+    assert "camera:  in free space" in text
 
 
 def test_a_camera_in_geometry_is_an_error(room, capsys) -> None:
