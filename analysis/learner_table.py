@@ -43,6 +43,9 @@ VARIANTS = {
 }
 """What ours of other results is called here: its file and its column, beside `METHODS`."""
 
+BEFORE = "ours_before"
+"""In results.csv: the runs of ours, of an earlier commit, that the variants were compared with."""
+
 PAGE = Path("docs/learner/README.md")
 PAGES = {
     Path("README.md"): (("mape", "dssim"), list(METHODS)[:3]),
@@ -58,6 +61,7 @@ def learner_table(results: pd.DataFrame, metrics: Sequence[str], methods: Sequen
         number of seeds, of each method where they have not as many
     """
     columns = {**METHODS, **{name: column for name, (_, column) in VARIANTS.items()}}
+    columns[BEFORE] = "ours, then"
     heads = ["scene", "seeds", *(columns[method] for method in methods)]
     lines = [markdown_row(heads), markdown_row([":--", "--:", *[":--"] * len(methods)])]
     rows = results.set_index(["scene", "method"])
@@ -86,20 +90,20 @@ def minute_table(results: pd.DataFrame) -> str:
 
 
 def variant_table(results: pd.DataFrame, variant: pd.DataFrame, name: str) -> str:
-    """Of ours, of a variant of it, and of the denoiser.
+    """Of ours as it was then, of a variant of it, and of the denoiser.
 
     variant: a report's table of one method; name: in `VARIANTS`
     Raises ValueError where the variant has another scene or other seeds than ours.
     """
     runs = variant.dropna(subset="seeds").assign(method=name)  # not the references' noise
-    seeds = results[results["method"] == "ours"].set_index("scene")["seeds"]
+    seeds = results[results["method"] == BEFORE].set_index("scene")["seeds"]
     for scene, of_variant in zip(runs["scene"], runs["seeds"], strict=True):
         if seeds.get(scene) != of_variant:
             raise ValueError(
                 f"{VARIANTS[name][0]}: '{scene}' has seeds {of_variant}, in {RESULTS} "
                 f"{seeds.get(scene)}"
             )
-    methods = ["ours", name, "path_tracing_oidn_8spp"]
+    methods = [BEFORE, name, "path_tracing_oidn_8spp"]
     return learner_table(pd.concat([results, runs]), METRICS, methods)
 
 
