@@ -162,8 +162,12 @@ class PredictedLoss:
         *,
         losses: Tensor,
     ) -> tuple[PredictedState, ChainInfo]:
-        """Remembers the proposals' losses, [n]; those that are NaN or infinite are forgotten."""
+        """Remembers the proposals' losses, [n]; those that are NaN or infinite are forgotten.
+
+        Of any device; no gradient is kept.
+        """
         assert proposals.known is not None
+        losses = losses.detach().float().to(proposals.known.device)
         finite = losses.isfinite()
         seen = torch.cat([state.seen, proposals.known[finite]])[-self._memory :]
         loss = torch.cat([state.loss, losses[finite]])[-self._memory :]

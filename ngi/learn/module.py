@@ -89,13 +89,18 @@ class IlluminationModule(LightningModule):
         targets: others that are asked for besides the sampler's
 
         Raises what would otherwise be raised at the first steps: samples that are not what the
-        network takes, patches smaller than the loss's window, an optimiser or a network that a
-        target can not score, a wrong learning rate.
+        network takes, patches smaller than the loss's window, a loss that is not one per sample,
+        an optimiser or a network that a target can not score, a wrong learning rate.
         """
         self._check_inputs(patches)
         optimizer = self.configure_optimizers()
         with self.learner.scorer.watch(patches, patches, optimizer) as score:
             losses, prediction = self.learner.losses(patches)
+        if losses.shape != (len(patches),):
+            raise ValueError(
+                f"loss: {type(self.learner.loss).__name__} gives a tensor of shape "
+                f"{list(losses.shape)} for {len(patches)} samples; expected one loss for each"
+            )
         score(prediction, losses)
         for target in targets:
             self._scorer_of(target).signals(patches, optimizer)

@@ -200,11 +200,13 @@ def network_of(samples: Samples, make: Callable[..., nn.Module]) -> nn.Module:
     """A network for these samples.
 
     make: its class or the like, its own sizes given; what it asks for of
-        `Samples.network_arguments` it gets
+        `Samples.network_arguments` it gets, and all of them where it takes any (`**rest`)
     """
     given = samples.network_arguments
     try:
-        wanted: Container[str] = inspect.signature(make).parameters
+        parameters = inspect.signature(make).parameters
+        takes_any = any(each.kind is each.VAR_KEYWORD for each in parameters.values())
+        wanted: Container[str] = given if takes_any else parameters
     except ValueError:  # its own arguments do not fit; the call says which
         wanted = given
     return make(**{name: value for name, value in given.items() if name in wanted})

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import torch
+from numpy.typing import ArrayLike
 from torch import Tensor, nn
 
 from ngi.evaluate.metrics import radiance_of
@@ -50,7 +51,11 @@ class TrainedRun(OpenedRun):
 
     @classmethod
     def open(
-        cls, folder: Path, *, scene_path: Path | str | None = None, supersampled_edges: bool = False
+        cls,
+        folder: Path | str,
+        *,
+        scene_path: Path | str | None = None,
+        supersampled_edges: bool = False,
     ) -> TrainedRun:
         """Loads a finished, interrupted or running run; nothing of it is changed or executed.
 
@@ -61,6 +66,7 @@ class TrainedRun(OpenedRun):
         ValueError for a damaged one, for a scene that is unknown or has changed since, and for a
         run without a network.
         """
+        folder = Path(folder)
         with settings_of(folder) as settings:
             checkpoint = newest_checkpoint(folder, settings)
             run = opened(folder, settings, scene_path)
@@ -88,12 +94,17 @@ class TrainedRun(OpenedRun):
         dtype = shown_in(self.precision, device.type)
         inputs = self.samples.test_inputs(scene_vector, buffers, preview=preview)
         on_device = (tensor.to(device) for tensor in (buffers, *inputs))
-        with torch.autocast(device.type, torch.bfloat16, enabled=dtype == torch.bfloat16):
+        precision = torch.autocast(device.type, torch.bfloat16, enabled=dtype == torch.bfloat16)
+        with torch.no_grad(), precision:
             output: Tensor = self.image(*on_device)[0]
         return output.float().cpu()
 
-    def radiance(self, scene_vector: Tensor, *, resolution: int) -> Tensor:
-        """[H, W, 3]: what the network says of a v of shape [D]; linear RGB, possibly negative."""
+    def radiance(self, scene_vector: ArrayLike | Tensor, *, resolution: int) -> Tensor:
+        """[H, W, 3] on the CPU: the network's image of a v [D]; linear RGB, possibly negative.
+
+        scene_vector: numbers in [0, 1], as a list, an array or a tensor of any precision
+        """
+        scene_vector = torch.as_tensor(scene_vector, dtype=torch.float32)
         buffers = self.renderer.image_buffers(scene_vector, resolution=resolution)
         return radiance_of(self.predict(buffers, scene_vector))
 

@@ -134,6 +134,19 @@ def test_the_oldest_and_what_is_not_finite_are_forgotten() -> None:
     assert torch.equal(state.seen[-1], proposals.position[3])
 
 
+def test_losses_that_have_gradients_leave_none_in_the_state() -> None:
+    found, generator = sampler(), torch.Generator().manual_seed(0)
+    state = found.init(3)
+    for batch in range(20):
+        proposals = found.propose(state, generator, batch=batch)
+        losses = torch.rand(CHAINS, generator=generator).double().requires_grad_()
+        ids, target = torch.arange(CHAINS), torch.zeros(CHAINS)
+        state, _ = found.accept(state, proposals, ids, target, target, generator, losses=losses)
+    assert state.loss.dtype == torch.float32
+    assert not state.loss.requires_grad
+    assert not state.leaf.requires_grad
+
+
 def test_a_forest_serves_until_an_eighth_of_what_is_remembered_is_newer() -> None:
     found = sampler(memory=64)
     state, generator = found.init(3), torch.Generator().manual_seed(0)

@@ -56,6 +56,10 @@ def test_an_error_of_the_command_line_ends_it(
         (["tracker=wandb", "tracker.mode=maybe"], ["tracker.mode", "maybe"]),
         (["run.lpips_weights=/nowhere.pth"], ["nowhere.pth"]),
         (["renderer.patch_size=8"], ["window", "8 x 8"]),
+        (
+            ["loss._target_=torch.nn.L1Loss", "~loss.l1_weight", "~loss.dssim_weight"],
+            ["loss: L1Loss", "shape []", "one loss for each"],
+        ),
         (["reuse.when_late=maybe"], ["reuse.when_late", "maybe"]),
         (["optimizer._target_=torch.optim.AdamW"], ["optimizer.weight_decay is 0.01"]),
         (["optimizer._target_=torch.optim.SGD"], ["SGD", "optimizer=muon"]),

@@ -145,6 +145,18 @@ def test_a_network_gets_what_it_asks_for() -> None:
     assert torch.equal(given["moving"].weight, expected)
 
 
+def test_a_network_that_takes_anything_is_given_everything() -> None:
+    given: dict[str, object] = {}
+
+    def mine(*, extra: int = 0, **rest: object) -> nn.Module:
+        given.update(rest)
+        return nn.Linear(1, 1 + extra)
+
+    samples = PatchSamples(renderer=MovingCamera(patch_size=16))
+    network_of(samples, mine)
+    assert given.keys() == {"layout", "scene_dimensions", "moving"}
+
+
 def test_the_paper_gives_all_of_v() -> None:
     samples = PatchSamples(renderer=MovingCamera(patch_size=16))
     v = torch.rand(SCENE_VARIABLES + 2)

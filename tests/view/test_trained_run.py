@@ -44,6 +44,17 @@ def test_edges_can_be_supersampled_of_a_run_that_has_them_asked_for_once(tmp_pat
     assert changed.any()
 
 
+def test_it_is_asked_by_lists_and_arrays_and_keeps_no_gradients(tmp_path: Path) -> None:
+    train(configuration(tmp_path, "budget.steps=12"))
+    opened = TrainedRun.open(str(tmp_path / "run"))
+    v = opened.renderer.hard_frames()[3]
+    expected = opened.radiance(v, resolution=32)
+    opened.network.render = type(opened.network).render.__wrapped__.__get__(opened.network)
+    for same in (v.tolist(), v.numpy().astype(np.float64)):
+        found = opened.radiance(same, resolution=32)
+        assert np.array_equal(found.numpy(), expected.numpy())
+
+
 def test_a_network_of_whole_images_cannot_be_asked_for_quarters() -> None:
     settings = {"data": {"_target_": "ngi.methods.cnsr.ObservationSets", "observations": 3}}
     with pytest.raises(ValueError, match="whole images from ObservationSets"):
