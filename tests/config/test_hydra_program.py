@@ -159,7 +159,7 @@ def test_costs_name_what_chooses_the_folder_they_write_to(tmp_path: Path) -> Non
 
 def test_a_launcher_that_is_not_installed_is_told_how_to_get() -> None:
     missing = MissingConfigException("", "hydra/launcher/submitit_slurm", ["basic"])
-    assert "launcher can be basic; pip install " in explained(missing)
+    assert "launcher can be basic; install it with pip install " in explained(missing)
     assert "[slurm]" in explained(missing)
 
 

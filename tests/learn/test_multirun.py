@@ -91,7 +91,7 @@ def test_a_sweeper_that_optimises_is_given_the_error_on_hard_frames(tmp_path: Pa
     (tmp_path / "hydra_plugins" / "optimising.py").write_text(SWEEPER)
     words = ("optimizer.lr=1e-3,1e-2", "run.folder='outputs/${optimizer.lr}'")
     sweeper = "hydra.sweeper._target_=hydra_plugins.optimising.Optimising"
-    for _ in ("trained", "finished already"):
+    for _ in ("trained", "already finished"):
         status, output = run_cold(tmp_path, *words, sweeper, options=("-m",))  # it finds plugins
         assert status == 0, output
         values = [float(value) for value in (tmp_path / "values").read_text().split()]
@@ -101,5 +101,5 @@ def test_a_sweeper_that_optimises_is_given_the_error_on_hard_frames(tmp_path: Pa
             frames = json.loads((tmp_path / "outputs" / rate / "result.json").read_text())["frames"]
             expected.append(mean(each["mape"] for each in frames if each["set"] == "hard"))
         assert values == pytest.approx(expected)
-    assert "finished already" in output
+    assert "already finished" in output
     assert values[0] != values[1]

@@ -292,7 +292,7 @@ def test_two_variables_may_not_set_the_same_thing(make_scene, entries, what) -> 
     count = sum(np.size(entry.get("minimum", 0)) for entry in entries)
     folder = make_scene("stage", entries, dimensions=count, edit=name_what_is_inside)
     first, second = (f"{entry['object']}.{entry['property']}" for entry in entries)
-    with pytest.raises(ValueError, match=f"{second}: it sets {what}.*, as {first} does"):
+    with pytest.raises(ValueError, match=f"{second}: it sets {what}.*, which {first} sets too"):
         VariableScene(read_scene(folder))
 
 

@@ -46,7 +46,7 @@ def test_weights_of_another_step_than_the_metrics_are_refused(folder, capsys) ->
         (older / "previous.ckpt").write_bytes(view)
     (older / "last.ckpt").write_bytes(b"damaged")
     assert main([f"run={older}", f"out={folder}/wrong"]) == 2
-    assert "a result.json of step 6, but its newest checkpoint" in capsys.readouterr().err
+    assert "a result.json of step 6, but its newest undamaged checkpoint" in capsys.readouterr().err
     assert not (folder / "wrong").exists()
 
 

@@ -134,8 +134,11 @@ def test_the_observations_count_as_time_of_a_frame(unbroken: Path) -> None:
         (["resolution=growing"], ["resolution", "600", "resolution=constant"]),
         (["renderer.patch_size=18", "resolution.start=18"], ["18 x 18", "renderer.patch_size"]),
         (["sampler=mcmc_loss_step"], ["PatchLinear", "choose a target that needs no step norm"]),
-        (["data=patches"], ["model and data do not fit", "CNSR", "2 tensors"]),
-        (["model=pixel_generator"], ["model and data do not fit", "PixelGenerator", "4 tensors"]),
+        (["data=patches"], ["model and data do not fit", "CNSR", "2 input tensors"]),
+        (
+            ["model=pixel_generator"],
+            ["model and data do not fit", "PixelGenerator", "4 input tensors"],
+        ),
         (["data.observations=0"], ["data.observations is 0"]),
     ],
 )

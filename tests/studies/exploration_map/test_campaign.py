@@ -97,13 +97,13 @@ def test_runs_of_another_size_are_refused(tmp_path: Path, trained: list[campaign
     trained += [campaign.Run(BASE, Method("none", False), 0)] * 10
     campaign.run_all(PLAN, seeds=[3], folder=tmp_path, jobs=1)
     longer = replace(PLAN, steps=8)
-    with pytest.raises(ValueError, match=r"provenance.json: .* another size"):
+    with pytest.raises(ValueError, match=r"provenance.json: .* a different size"):
         campaign.run_all(longer, seeds=[3], folder=tmp_path, jobs=1)
     file = tmp_path / "provenance.json"
     changed = json.loads(file.read_text())
     changed["configuration"]["uniform"]["loss"]["l1_weight"] = 3.0
     file.write_text(json.dumps(changed))
-    with pytest.raises(ValueError, match="another configuration"):
+    with pytest.raises(ValueError, match="a different configuration"):
         campaign.run_all(PLAN, seeds=[3], folder=tmp_path, jobs=1)
 
 
