@@ -19,8 +19,8 @@ from ngi.view.screen import CURVES, PARTS, Screen
 
 RESOLUTIONS = ("64", "128", "256", "384", "512", "768", "900")
 CHOOSE = "choose …"
-STATUS = "height: 7em; overflow-y: auto; padding: 0 1em; font-size: 0.85em; line-height: 1.4"
-"""Of what is said: a click that falls while a button moves is lost."""
+STATUS = "height: 9.8em; overflow-y: auto; padding: 0 1em; font-size: 0.85em; line-height: 1.4"
+"""Of what is said, seven lines of it: a click that falls while a button moves is lost."""
 MOST_STEPS_BACK = 50
 MOST_SLIDERS = 200
 """More variables than that are set by presets alone: a browser draws every slider."""

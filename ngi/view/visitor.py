@@ -127,17 +127,16 @@ class Visitor:
             self._walk.follow()
 
     def _status(self, shown: Shown, *, sending: float) -> list[str]:
+        """What is asked for first: later lines may have to be scrolled to."""
         view = shown.view
         parts = {**view.seconds, "sending": sending}
-        lines = [
-            f"{view.place.resolution} × {view.place.resolution} pixels",
-            ", ".join(f"{name} {1e3 * seconds:.0f} ms" for name, seconds in parts.items()),
-        ]
+        lines = [f"{view.place.resolution} × {view.place.resolution} pixels"]
+        if shown.wish.screen.traces_paths:
+            lines[0] += f", {view.samples} samples per pixel"
+            lines.append(self._metrics(shown) if shown.full else "metrics once nothing moves")
+        lines.append(", ".join(f"{name} {1e3 * seconds:.0f} ms" for name, seconds in parts.items()))
         if (rate := self._pictures_per_second()) is not None:
             lines.append(f"{rate:.1f} pictures per second")
-        if shown.wish.screen.traces_paths:
-            lines.append(f"{view.samples} samples per pixel")
-            lines.append(self._metrics(shown) if shown.full else "metrics once nothing moves")
         return lines
 
     def _pictures_per_second(self) -> float | None:

@@ -27,7 +27,7 @@ from ngi.evaluate.metrics import mape  # noqa: E402
 from ngi.render import AnalyticRenderer  # noqa: E402
 from ngi.view.page import Page  # noqa: E402
 from ngi.view.picture import PictureOptions  # noqa: E402
-from ngi.view.scene_view import Place, SceneView  # noqa: E402
+from ngi.view.scene_view import PASS_SAMPLES, Place, SceneView  # noqa: E402
 from ngi.view.screen import Screen  # noqa: E402
 from ngi.view.session import Wish  # noqa: E402
 from ngi.view.studio import Shown, Studio  # noqa: E402
@@ -314,7 +314,20 @@ def test_what_it_says_takes_the_same_room_and_is_no_markup(browser: Browser) -> 
         said.append(made._panel._status.content)
     assert "&lt;b&gt;1&lt;/b&gt;" in said[0]
     assert "This failed: RuntimeError" in said[1]
-    assert all("height: 7em" in each for each in said)
+    assert all("height: 9.8em" in each for each in said)
+
+
+def test_metrics_come_before_the_times_which_may_have_to_be_scrolled_to(browser: Browser) -> None:
+    made = visitor(browser)
+    made._panel._show.value = "network | path tracer"
+    view = SceneView(made.wish.place, AnalyticRenderer(dimensions=7, patch_size=16), coloured)
+    view.trace()
+    size, metrics, times, *_ = made._status(
+        Shown(made.wish.screen.pixels(view), view, made.wish, full=True), sending=0.0
+    )
+    assert size.endswith(f" pixels, {PASS_SAMPLES} samples per pixel")
+    assert metrics.startswith("MAPE")
+    assert " ms" in times
 
 
 def test_where_reset_view_leads_is_where_a_page_begins() -> None:
