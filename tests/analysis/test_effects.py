@@ -20,6 +20,21 @@ def compare(folder, scene: str = "living-room"):  # type: ignore[no-untyped-def]
     return compare_on_scene(runs_below(folder), scene, "active_exploration", "uniform")
 
 
+def test_less_error_in_the_worst_frames_is_negative(make_method, tmp_path) -> None:
+    def halved(result: dict) -> None:
+        for metrics in result["metrics"].values():
+            for metric in metrics.values():
+                metric["worst5"] *= 0.5
+                metric["mean"] *= 3
+
+    for seed in range(3):
+        make_method("active_exploration", seed=seed, change=halved)
+        make_method("uniform", seed=seed)
+    effects = compare(tmp_path).effects
+    assert effects["hard_mape_worst5"].effect_percent == pytest.approx(-50)
+    assert effects["uniform_dssim_worst5"].effect_percent == pytest.approx(-50)
+
+
 def test_effect_is_the_ratio_of_errors_on_the_same_frames(make_method, tmp_path) -> None:
     ratios = []
     for seed in range(3):

@@ -45,6 +45,31 @@ def test_every_claim_has_a_test_that_decides() -> None:
     assert {claim.id for claim in CLAIMS} >= FINDINGS.keys()
 
 
+EXPLORING = "active_exploration"
+PAPERS = {
+    "same_time": [(EXPLORING, "uniform")],
+    "preconditioning": [(EXPLORING, "no_preconditioning")],
+    "resolution": [(EXPLORING, "constant_resolution"), ("uniform", "uniform_growing")],
+    "target_function": [(EXPLORING, "loss_target")],
+    "acceptance": [(EXPLORING, "metropolis")],
+    "histogram": [(EXPLORING, "uniform")],
+    "dimensions": [],
+    "specular": [("traced_specular", EXPLORING)],
+    "cnsr": [(EXPLORING, "cnsr")],
+    "anf": [(EXPLORING, "anf")],
+    "chess": [],
+}
+"""What the paper says to be better, and than what, by the claim."""
+
+
+def test_what_the_paper_says_to_be_better_comes_first_and_which_test_is_primary() -> None:
+    papers = [claim for claim in CLAIMS if not claim.with_ours]
+    decisive = {c.id: [(x.better, x.worse) for x in c.comparisons if x.decides] for c in papers}
+    assert decisive == PAPERS
+    primary = {claim.id for claim in papers if claim.primary == "finding"}
+    assert primary == {"histogram", "dimensions", "chess"}
+
+
 def test_with_our_learner_no_statement_is_about_the_papers_optimiser() -> None:
     ours = [claim for claim in CLAIMS if claim.with_ours]
     assert len(ours) == len(CLAIMS) / 2

@@ -34,6 +34,18 @@ def test_large_steps_are_uniform_in_every_component() -> None:
     assert (correlation - torch.eye(3)).abs().max() < 4 / 20_000**0.5
 
 
+@pytest.mark.parametrize("proposal", [NORMAL, EXPONENTIAL])
+def test_every_component_takes_small_steps_of_its_own(proposal) -> None:
+    n, dimensions = 20_000, 5
+    position = torch.full((n, dimensions), 0.5)
+    moved = proposal.propose(position, generator(), batch=0).position - 0.5
+    alone = displacement(proposal, 0.5, seed=1)
+    for component in moved.T:
+        assert stats.ks_2samp(component.numpy(), alone).pvalue > SIGNIFICANCE
+    for of in (moved, moved.abs()):
+        assert (torch.corrcoef(of.T) - torch.eye(dimensions)).abs().max() < 5 / n**0.5
+
+
 def test_small_steps_are_not_uniform() -> None:
     proposals = NORMAL.propose(torch.full((20_000, 1), 0.3), generator(), batch=0)
     assert stats.kstest(proposals.position.flatten().numpy(), "uniform").pvalue < 1e-9
