@@ -9,7 +9,7 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.runs import SETS, Run
+from analysis.runs import Run
 
 MOST_TIME_APART = 0.05
 """Relative difference of run times up to which runs count as given the same time."""
@@ -31,7 +31,7 @@ def comparison_warnings(runs: Sequence[Run]) -> list[str]:
     and scene with different settings.
     """
     warnings = _of_different_settings(runs)
-    if diverged := [str(run.folder) for run in runs if any(map(run.diverged, SETS))]:
+    if diverged := [str(run.folder) for run in runs if run.diverged_anywhere]:
         warnings.append(
             f"{len(diverged)} run(s) ended with errors that are not finite, and so do means over "
             f"their seeds; curves and times to equal error leave them out: {', '.join(diverged)}"

@@ -67,6 +67,11 @@ class Run:
         errors = self.history.get(f"{set_name}_mape")
         return errors is not None and not math.isfinite(float(errors.iloc[-1]))
 
+    @property
+    def diverged_anywhere(self) -> bool:
+        """Whether it has on any of the `SETS`."""
+        return any(map(self.diverged, SETS))
+
     def metric(self, set_name: str, metric: str, statistic: str = "mean") -> float | None:
         """One metric at the end of the run; statistic is mean, worst5 or floor; None if missing.
 

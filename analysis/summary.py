@@ -41,7 +41,7 @@ class Summary:
     @property
     def diverged(self) -> int:
         """Runs that ended with errors that are not finite; means over the seeds are not, either."""
-        return sum(any(map(run.diverged, SETS)) for run in self.runs)
+        return sum(run.diverged_anywhere for run in self.runs)
 
 
 def summarise(runs: Sequence[Run]) -> list[Summary]:

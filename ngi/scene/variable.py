@@ -132,6 +132,8 @@ class RangedVariable(Variable):
     linked: bool = False
 
     numbers: ClassVar[tuple[str, ...]] = ("",)
+    unit: ClassVar[str] = ""
+    """Of the numbers, 'degrees'; empty for those that have none or the scene's own."""
     limits: ClassVar[tuple[float, float]] = (-inf, inf)
 
     @property

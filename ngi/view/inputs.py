@@ -10,11 +10,9 @@ import numpy as np
 import viser
 
 from ngi.scene import SceneDescription, Variable, srgb
-from ngi.scene.kinds import Direction, FieldOfView, Rotation, Visibility
-from ngi.scene.kinds.numbers import Cone
+from ngi.scene.kinds import Visibility
 from ngi.scene.variable import DiscreteVariable, RangedVariable
 
-IN_DEGREES = (Cone.kind, Direction.kind, FieldOfView.kind, Rotation.kind)
 COLOUR = ("r", "g", "b")
 """The components of a variable that is a colour."""
 
@@ -27,7 +25,7 @@ class Control:
     name: what of them varies
     component: its index in v
     low, high: what 0 and 1 stand for, in the scene's units
-    unit: of low and high, where they are degrees
+    unit: see `RangedVariable.unit`
     choices: of a discrete variable, each an equally long part of [0, 1]; else empty
     of_colour: whether it is one of three in a row that are red, green and blue, linear
     """
@@ -81,9 +79,8 @@ def _controls(variable: Variable, start: int) -> list[Control]:
         ranges = zip(variable.minimum, variable.maximum, strict=True)
         limits = [limit for limit in ranges if limit[0] != limit[1]]
         of_colour = variable.components == COLOUR
-        unit = "degrees" if variable.kind in IN_DEGREES else ""
         return [
-            Control(group, name, start + i, low, high, unit, of_colour=of_colour)
+            Control(group, name, start + i, low, high, variable.unit, of_colour=of_colour)
             for i, (name, (low, high)) in enumerate(zip(names, limits, strict=True))
         ]
     return [Control(group, name, start + i) for i, name in enumerate(names)]

@@ -154,9 +154,9 @@ class Visitor:
         reference = view.reference
         measured = image_metrics(view.prediction, reference, protocol=protocol, lpips=None)
         said = {name: f"{value:.3g}" for name, value in measured.items() if value is not None}
-        if view.noise is not None:
-            noise = mape(reference + view.noise, reference, protocol.epsilon)
-            said["mape"] += f" (path tracer's noise about {noise:.2g})"
+        if (noise := view.noise) is not None:
+            about = mape(reference + noise, reference, protocol.epsilon)
+            said["mape"] += f" (path tracer's noise about {about:.2g})"
         return ", ".join(f"{name.upper()} {value}" for name, value in said.items())
 
     def _add_files(self) -> None:

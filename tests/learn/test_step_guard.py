@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
 import torch
@@ -24,13 +25,20 @@ from ngi.learn import (
 )
 from ngi.learn.lightning_api import Callback, Trainer
 from ngi.learn.module import OptimizerFactory
-from ngi.learn.step_guard import LARGEST_NORM, REFUSED_IN_A_ROW, Attempt, largest_moment
+from ngi.learn.step_guard import (
+    LARGEST_NORM,
+    OUTLIER,
+    REFUSED_IN_A_ROW,
+    Attempt,
+    largest_moment,
+)
 from ngi.learn.stream import TrainingStream
 from ngi.models import L1Dssim, MuonAdam, PixelGenerator
 from ngi.models.pixel_mlp import PixelMLP
 from ngi.render import AnalyticRenderer, RenderedPatches
 from tests.learn.lightning_warnings import IGNORED
 from tests.learn.small_stream import make
+from tests.learn.test_step import module
 
 Disturbance = Callable[[int, Tensor], Tensor]
 """(number of the step, from 1; what is computed) -> what is given on."""
@@ -220,19 +228,35 @@ def test_refusals_in_a_row_stop_the_run_with_what_does_the_last_one_again(tmp_pa
     assert report["optimizer"]["state"] == {}  # no step was taken
 
 
-def test_refusals_before_an_interruption_count(tmp_path: Path) -> None:
-    stream = make(tmp_path, target=LossTimesStep())
+def attempt_of(stream: TrainingStream, *, loss: float, gradient_norm: float) -> Attempt:
     network = torch.nn.Linear(1, 1)
-    attempt = Attempt(
+    return Attempt(
         number=1,
         batch=next(iter(stream)),
-        losses=torch.full((4,), math.nan),
-        loss=math.nan,
-        gradient_norm=1.0,
+        losses=torch.full((4,), loss),
+        loss=loss,
+        gradient_norm=gradient_norm,
         largest_moment=0.0,
         network=network,
         optimizer=torch.optim.SGD(network.parameters(), lr=1.0),
     )
+
+
+def test_a_resumed_run_knows_how_large_gradients_were(tmp_path: Path) -> None:
+    before, after = (module(make(tmp_path / name), tmp_path) for name in "ab")
+    attempt = attempt_of(make(tmp_path / "c"), loss=1.0, gradient_norm=2.0)
+    for _ in range(3):
+        before.learner.guard.admit(attempt)
+    checkpoint: dict[str, Any] = {}
+    before.on_save_checkpoint(checkpoint)
+    after.on_load_checkpoint(checkpoint)
+    assert not after.learner.guard.admits(replace(attempt, gradient_norm=2.1 * OUTLIER))
+    assert after.learner.guard.admits(replace(attempt, gradient_norm=1.9 * OUTLIER))
+
+
+def test_refusals_before_an_interruption_count(tmp_path: Path) -> None:
+    stream = make(tmp_path, target=LossTimesStep())
+    attempt = attempt_of(stream, loss=math.nan, gradient_norm=1.0)
     before, resumed = (StepGuard(stream=stream, folder=tmp_path) for _ in range(2))
     for _ in range(REFUSED_IN_A_ROW - 1):
         before.admit(attempt)

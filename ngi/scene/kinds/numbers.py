@@ -41,6 +41,7 @@ class FieldOfView(Number):
 
     kind = "fov"
     affects = frozenset({"camera"})
+    unit = "degrees"
     limits = (0.1, 179.0)
 
     def bind_one(self, scene: LoadedScene, object_id: str) -> Write:
@@ -57,6 +58,7 @@ class Cone(RangedVariable):
 
     kind = "cone"
     numbers = ("cutoff_angle", "beam_width")
+    unit = "degrees"
     limits = (0.0, 180.0)
 
     def bind_one(self, scene: LoadedScene, object_id: str) -> Write:

@@ -44,6 +44,7 @@ class Rotation(RangedVariable):
 
     kind = "rotation"
     affects = frozenset({"position", "emission"})
+    unit = "degrees"
 
     def bind_one(self, scene: LoadedScene, object_id: str) -> Write:
         placement = scene.placement(object_id)

@@ -101,6 +101,7 @@ class Direction(RangedVariable):
 
     kind = "direction"
     numbers = ("azimuth", "elevation")
+    unit = "degrees"
     limits = (-360.0, 360.0)
 
     def bind_one(self, scene: LoadedScene, object_id: str) -> Write:
