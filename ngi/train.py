@@ -14,8 +14,9 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig
 
 from ngi.config.build import build_recorder, build_run, plain, run_costs, training_device
+from ngi.config.command_words import completed, with_overrides
 from ngi.config.configuration import register, run_settings, scene_record
-from ngi.config.hydra_program import MESSAGES, completed, fail, run_program, with_overrides
+from ngi.config.hydra_program import fail, job_of, run_program
 from ngi.config.outline import only_bootstrap, outline
 from ngi.config.values import check_values
 from ngi.files.extras import install_command
@@ -177,10 +178,8 @@ def _main(config: DictConfig) -> float:
     """The mean MAPE on hard frames, which a sweeper that optimises minimises."""
     from ngi.render.pilot_advice import pilot_advice
 
-    try:
+    with job_of(config.run.folder):
         result = train(config)
-    except MESSAGES as error:
-        fail(error, job=config.run.folder)
     hard = result["metrics"]["hard"]
     log.info(
         "%s: %s",

@@ -1,32 +1,19 @@
-"""Programs that Hydra configures: the words of their command lines, and what is wrong with them.
-
-Where the words name no budget, and no method or one of ours, that one (or else `method=ours`) is
-trained at a size that suits this machine: `ngi train scene=X budget.seconds=60` gives the best
-network that it can train in that time. Methods that are compared with ours have the same size.
-Where they name no method, and a budget that is not the paper's, it is the one of ours that had the
-least error there. Other methods alone, an experiment, a sweep or another budget, once named, are
-taken at their word.
-
-What is wrong is said once, with the nearest of what there is.
-"""
+"""Programs that Hydra configures: what is wrong is said once, with the nearest of what there is."""
 
 import logging
 import os
 import re
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from difflib import get_close_matches
 from traceback import format_exception
 from typing import Any, NoReturn
 
-from hydra._internal.utils import get_args_parser
 from hydra.core.hydra_config import HydraConfig
-from hydra.core.override_parser.overrides_parser import OverridesParser
-from hydra.core.override_parser.types import Glob
 from hydra.errors import (
     CompactHydraException,
     ConfigCompositionException,
-    HydraException,
     InstantiationException,
     MissingConfigException,
     OverrideParseException,
@@ -35,89 +22,13 @@ from hydra.types import RunMode
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
+from ngi.config.command_words import MULTIRUN, in_order
 from ngi.config.unread_output import readers_may_leave
 from ngi.files.extras import install_command
-from ngi.files.resources import config_groups, root, scene_places
-
-MULTIRUN = ("-m", "--multirun")
-SHOWING = ("-c", "--cfg", "-i", "--info", "-h", "--help", "--hydra-help")
-"""Options with which nothing runs."""
-
-BEST_METHOD = {"machine": "ours", "hour": "ours_small_patches", "scarce": "ours_small_patches"}
-"""Of each budget for ours: what had the least error there, scene by scene, of what was tried
-(docs/guide/sampler.md).
-"""
+from ngi.files.resources import config_groups, scene_places
 
 LAUNCHERS = {"joblib": "joblib", "submitit_local": "slurm", "submitit_slurm": "slurm"}
 """Options of hydra/launcher that are packages of their own: the extra that each is in."""
-
-CHOOSING = ("experiment", "sweeps", "path_tracing")
-"""Groups whose choice says what is trained, and for how long."""
-
-
-def completed(words: Sequence[str]) -> list[str]:
-    """The words of a command line, with what they leave open of method and budget."""
-    named = {
-        word.partition("=")[0].lstrip("+"): word.partition("=")[2]
-        for word in words
-        if "=" in word and not word.startswith("-")
-    }
-    budget = named.get("budget", "machine")
-    methods = _methods(named.get("method", "ours"))
-    with_ours = any(re.fullmatch(r"ours(_\w+)?(/\w+)?", method) for method in methods)
-    if budget not in BEST_METHOD or not with_ours or any(group in named for group in CHOOSING):
-        return list(words)
-    ours = {"budget": budget, "method": BEST_METHOD[budget]}
-    added = (f"{group}={choice}" for group, choice in ours.items() if group not in named)
-    return with_overrides(words, *added)
-
-
-def _methods(word: str) -> list[str]:
-    """Those that method=WORD means; none where Hydra will refuse it."""
-    try:
-        override = OverridesParser.create().parse_override(f"method={word}")
-    except HydraException:
-        return []
-    value: Any = override.value()
-    if isinstance(value, Glob):
-        return value.filter([file.stem for file in (root() / "conf" / "method").glob("*.yaml")])
-    if override.is_discrete_sweep():
-        return [name.strip("'\"") for name in override.sweep_string_iterator()]
-    return [str(value)]
-
-
-def in_order(words: Sequence[str]) -> list[str]:
-    """The words with -m before all others; argparse refuses overrides on both sides of an option.
-
-    Raises SystemExit, with a message, for an option that Hydra does not have, and for a sweep of
-    which a single run is asked for.
-    """
-    multirun = [word for word in words if word in MULTIRUN]
-    sweep = next((word for word in words if word.startswith("+sweeps=")), None)
-    if sweep and not multirun and not any(word.partition("=")[0] in SHOWING for word in words):
-        sys.exit(f"{sweep}: a sweep needs -m, as it has several runs; --dry-run only lists them")
-    ordered = [*multirun[:1], *(word for word in words if word not in MULTIRUN)]
-    unknown = get_args_parser().parse_known_args(ordered)[1]
-    if unknown and unknown[0].startswith("-"):
-        name, _, value = unknown[0].lstrip("-").partition("=")
-        sys.exit(
-            f"{unknown[0]}: there is no such option; settings of a run are written without dashes: "
-            f"{name}={value or '…'} (--help lists them)"
-        )
-    if unknown:
-        sys.exit(f"{unknown[0]}: put options, such as -m, before all words without dashes")
-    return ordered
-
-
-def with_overrides(words: Sequence[str], *overrides: str) -> list[str]:
-    """Hydra's command line with further overrides, before all others: those that follow win.
-
-    Overrides have to stand together, which argparse asks for.
-    """
-    are_overrides = ("=" in word and word[0] != "-" for word in words)
-    first = next((i for i, is_override in enumerate(are_overrides) if is_override), len(words))
-    return [*words[:first], *overrides, *words[first:]]
-
 
 log = logging.getLogger(__name__)
 
@@ -145,7 +56,7 @@ def run_program(program: Callable[[], None], *, folder_option: str = "run.folder
     Where its configuration cannot be composed, or a job of a sweep has failed or was killed by the
     system, the process ends with status 1 and one message, after Ctrl-C with status 130. Who sets
     HYDRA_FULL_ERROR=1 gets Hydra's own exceptions with their tracebacks; that of a job's error is
-    in its log file (`fail`).
+    in its log file (`job_of`).
 
     folder_option: what chooses the folder that Hydra writes to
     """
@@ -173,6 +84,21 @@ def run_program(program: Callable[[], None], *, folder_option: str = "run.folder
         sys.exit(" ".join(str(error).splitlines()[:2]).strip())  # the job's log may follow
     except KeyboardInterrupt:
         sys.exit(130)
+
+
+@contextmanager
+def job_of(name: str) -> Iterator[None]:
+    """What a job does, so that its errors are told, and kept in its log file.
+
+    name: the job's folder or name
+    """
+    try:
+        yield
+    except MESSAGES as error:
+        fail(error, job=name)
+    except Exception as error:  # a bug, which ends with its traceback
+        _keep_traceback(error)
+        raise
 
 
 def fail(error: Exception, *, job: str) -> NoReturn:

@@ -18,8 +18,9 @@ from omegaconf import DictConfig, OmegaConf, open_dict
 from tabulate import tabulate
 
 from ngi.config.build import build_module, build_samples, build_stream, run_components, without_seed
+from ngi.config.command_words import completed, with_overrides
 from ngi.config.configuration import register
-from ngi.config.hydra_program import MESSAGES, completed, fail, run_program, with_overrides
+from ngi.config.hydra_program import job_of, run_program
 from ngi.config.values import check_values
 from ngi.files.resources import CACHE_VARIABLE, cache_folder, root
 from ngi.machine.memory import keep_freed_memory
@@ -164,10 +165,8 @@ def _table(wanted: list[Component], *, new: list[Component], file: CostFile) -> 
 # Its log is kept beside the cost file; the runs' own folders are left alone.
 @hydra.main(version_base="1.3", config_path=str(root() / "conf"), config_name="train")
 def _main(config: DictConfig) -> None:
-    try:
+    with job_of(config.label.scene):
         measure(config)
-    except MESSAGES as error:
-        fail(error, job=config.label.scene)
 
 
 def main() -> None:

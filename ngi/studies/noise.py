@@ -18,8 +18,9 @@ from omegaconf import DictConfig, open_dict
 from tabulate import tabulate
 
 from ngi.config.build import build_network, build_samples
+from ngi.config.command_words import completed, with_overrides
 from ngi.config.configuration import register
-from ngi.config.hydra_program import MESSAGES, completed, fail, run_program, with_overrides
+from ngi.config.hydra_program import job_of, run_program
 from ngi.config.values import check_values
 from ngi.files.resources import root
 from ngi.files.run_folder import LAST
@@ -127,10 +128,8 @@ def _renderer(config: DictConfig, folder: Path, *, factor: int) -> Renderer:
 
 @hydra.main(version_base="1.3", config_path=str(root() / "conf"), config_name="train")
 def _main(config: DictConfig) -> None:
-    try:
+    with job_of(config.run.folder):
         rows = measure(config)
-    except MESSAGES as error:
-        fail(error, job=config.run.folder)
     heading = ("states", "loss", f"at {MORE_SAMPLES} times the samples", "part that is noise")
     print(tabulate(rows, heading, floatfmt=("", ".4f", ".4f", ".0%"), tablefmt="github"))
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from ngi.config.hydra_program import completed, in_order, with_overrides
+from ngi.config.command_words import completed, in_order, with_overrides
 from tests.learn.command_line import run
 
 
@@ -37,6 +37,9 @@ from tests.learn.command_line import run
         ("scene=x budget=hour", "method=ours_small_patches scene=x budget=hour"),
         ("budget=scarce seed=1", "method=ours_small_patches budget=scarce seed=1"),
         ("budget=scarce method=ours", "budget=scarce method=ours"),
+        ("-m budget=hour,scarce", "-m method=ours_small_patches budget=hour,scarce"),
+        ("budget='hour'", "method=ours_small_patches budget='hour'"),
+        ("-m budget=machine,hour method=ours", "-m budget=machine,hour method=ours"),
     ],
 )
 def test_ours_is_trained_where_the_words_leave_it_open(words: str, expected: str) -> None:
@@ -59,7 +62,7 @@ def test_ours_is_trained_where_the_words_leave_it_open(words: str, expected: str
         "method=ours_eager budget=small",
         "method=active_exploration budget=scarce",
         "-m +sweeps=ours_hour budget=hour",
-        "-m budget=hour,scarce",
+        "-m budget=small,hour",
         "experiment=demo",
         "-m +sweeps=same_time",
         "+path_tracing=oidn",
@@ -69,6 +72,11 @@ def test_ours_is_trained_where_the_words_leave_it_open(words: str, expected: str
 )
 def test_what_is_named_is_taken_at_its_word(words: str) -> None:
     assert completed(words.split()) == words.split()
+
+
+def test_budgets_that_train_different_methods_ask_for_one() -> None:
+    with pytest.raises(SystemExit, match=r"^budget=machine,hour: name .* ours for"):
+        completed(["-m", "budget=machine,hour"])
 
 
 @pytest.mark.parametrize(

@@ -144,6 +144,26 @@ def test_an_error_of_a_run_is_said_once_and_kept_where_the_run_is(
     assert not (tmp_path / "outputs").exists()
 
 
+FORGETFUL = """
+from ngi.reuse import Never
+
+class Forgetful(Never):
+    def __init__(self, **settings): pass
+
+    def probability(self, state, **counts):
+        return state.missing
+"""
+
+
+def test_a_bug_ends_with_a_traceback_that_is_kept_where_the_run_is(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(FORGETFUL)
+    status, output = run(tmp_path, "reuse.policy._target_=mine.Forgetful", "run.folder=here/run")
+    assert status == 1
+    assert "'PolicyState' object has no attribute 'missing'" in output
+    kept = (tmp_path / "here" / "run" / "train.log").read_text()
+    assert 'mine.py", line 8, in probability' in kept
+
+
 def test_an_error_of_what_is_measured_is_said_once(tmp_path: Path) -> None:
     status, output = run_module("ngi.studies.costs", *SMALL, "seed=maybe", folder=tmp_path)
     assert status == 1

@@ -15,7 +15,7 @@ import pytest
 
 from ngi.cli import VERBS
 from ngi.config.configuration import composed
-from ngi.config.hydra_program import completed
+from ngi.config.command_words import completed
 from tests.config.command_line import composed as known_to_hydra
 from tests.docs.pages import ROOT, commands
 

@@ -8,8 +8,9 @@ import sys
 import hydra
 from omegaconf import DictConfig
 
+from ngi.config.command_words import with_overrides
 from ngi.config.configuration import register
-from ngi.config.hydra_program import MESSAGES, fail, run_program, with_overrides
+from ngi.config.hydra_program import job_of, run_program
 from ngi.config.values import check_values
 from ngi.files.resources import root
 from ngi.machine.repeatable import make_repeatable
@@ -21,12 +22,10 @@ log = logging.getLogger(__name__)
 def _main(config: DictConfig) -> None:
     from ngi.studies.ceiling.campaign import run_all  # PyTorch takes seconds
 
-    try:
+    with job_of(config.run.folder):
         check_values(config)
         make_repeatable()
         log.info("written: %s", run_all(config))
-    except MESSAGES as error:
-        fail(error, job=config.run.folder)
 
 
 def main() -> None:
