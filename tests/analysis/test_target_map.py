@@ -73,6 +73,20 @@ def test_the_gain_is_the_target_density_that_the_states_have(
     assert first["floor"].iloc[0] > second["floor"].iloc[0]  # of fewer states
 
 
+@pytest.mark.parametrize(
+    ("density", "column"),
+    [(DENSITY, "floor"), (np.ones((CELLS, CELLS)), "uniform_distance")],
+    ids=["target", "uniform"],
+)
+def test_independent_states_are_as_far_from_the_target_as_expected(
+    tmp_path: Path, density: np.ndarray, column: str
+) -> None:
+    runs = [make(tmp_path / str(seed), density, seed=seed) for seed in range(4)]
+    of_steps = histogram_distances(runs).groupby("step")
+    found, expected = of_steps["distance"].mean(), of_steps[column].mean()
+    np.testing.assert_allclose(found, expected, rtol=0.15)
+
+
 def test_a_histogram_beside_its_target_has_distance_1(tmp_path: Path) -> None:
     run = make(tmp_path / "run", np.eye(CELLS))
     (run.folder / "target_map.bin").unlink()

@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 
 from ngi.cli import VERBS
-from ngi.config.configuration import composed
 from ngi.config.command_words import completed
+from ngi.config.configuration import composed
 from tests.config.command_line import composed as known_to_hydra
 from tests.docs.pages import ROOT, commands
 

@@ -6,6 +6,7 @@ from typing import Any
 import pandas as pd
 import torch
 
+from ngi.learn.checkpoint import STEP_GUARD, STREAM
 from ngi.machine.memory import COLUMNS
 
 
@@ -25,11 +26,11 @@ def assert_same(a: Any, b: Any, path: str = "") -> None:
 
 
 def final_state(folder: Path) -> dict[str, Any]:
-    """Weights, optimiser, chains, policy, and the store with its patches, however it was saved."""
+    """All that a run goes on from, and the store with its patches, however it was saved."""
     checkpoint = torch.load(folder / "last.ckpt", weights_only=True)
-    parts = ("state_dict", "optimizer_states", "ExplorationDataModule", "global_step")
+    parts = ("state_dict", "optimizer_states", STREAM, STEP_GUARD, "global_step")
     state = {part: checkpoint[part] for part in parts}
-    store = state["ExplorationDataModule"]["store"]
+    store = state[STREAM]["store"]
     names = [segment["name"] for segment in store.pop("segments")]
     segments = [torch.load(folder / "patches" / name, weights_only=True) for name in names]
     patches = {key: torch.cat([segment[key] for segment in segments]) for key in segments[0]}

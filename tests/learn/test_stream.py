@@ -17,6 +17,7 @@ from ngi.reuse import (
     Never,
     Prioritised,
     ReusePolicy,
+    SelfTuning,
     UntilFull,
 )
 from tests.learn.comparison import assert_same
@@ -41,6 +42,49 @@ def test_a_reused_batch_holds_the_stored_patches(tmp_path: Path) -> None:
                 torch.testing.assert_close(
                     batch.patches.log_radiance[i], seen[patch_id].log_radiance[0], atol=2e-3, rtol=0
                 )
+
+
+def test_the_policy_s_averages_are_of_large_steps_alone(tmp_path: Path) -> None:
+    """Paper, Sec. 6.1: computed again from every batch, of what the log says after it."""
+    stream = make(tmp_path, policy=SelfTuning(bootstrap_batches=1, beta=0.0, ema_coefficient=0.5))
+    averages: dict[bool, float] = {}  # by whether the batch was generated
+    told_apart, batches = 0, iter(stream)
+    for _ in range(60):
+        batch = next(batches)
+        feedback = answer(batch)
+        stream.feedback(feedback)
+        large = batch.patches.large_step
+        if large.any():
+            loss = feedback.losses[large].mean().item()
+            if not averages:
+                averages = {True: loss, False: loss}
+            else:
+                averages[batch.generated] = 0.5 * averages[batch.generated] + 0.5 * loss
+            told_apart += not large.all()
+        row = stream.log_row()
+        assert row["loss_new"] == pytest.approx(averages[True], rel=1e-6)
+        assert row["loss_existing"] == pytest.approx(averages[False], rel=1e-6)
+    assert told_apart > 5
+    assert abs(averages[True] / averages[False] - 1) > 1e-3  # exchanged columns would be seen
+
+
+def test_the_log_tells_acceptance_of_large_steps_from_that_of_small_ones(tmp_path: Path) -> None:
+    stream = make(tmp_path, policy=Never())
+    told_apart, batches = 0, iter(stream)
+    for _ in range(30):
+        stream.feedback(answer(next(batches)))
+        record, row = stream.chain_record, stream.log_row()
+        assert record is not None
+        for name, of_them in (
+            ("acceptance_rate", ~record["initialised"]),
+            ("large_step_acceptance_rate", ~record["initialised"] & record["large_step"]),
+            ("small_step_acceptance_rate", ~record["initialised"] & ~record["large_step"]),
+        ):
+            accepted = record["accepted"][of_them]
+            expected = accepted.mean() if len(accepted) else float("nan")
+            assert row[name] == pytest.approx(expected, nan_ok=True)
+        told_apart += row["large_step_acceptance_rate"] != row["small_step_acceptance_rate"]
+    assert told_apart > 5
 
 
 def test_greedy_chains_climb(tmp_path: Path) -> None:
