@@ -268,11 +268,14 @@ def test_every_frame_has_its_pictures(evaluator, tmp_path) -> None:
         assert sheet.height > 33 * 7
 
 
-def test_pictures_show_the_tone_mapped_radiance(evaluator, tmp_path) -> None:
+@pytest.mark.parametrize(("exposure", "shown"), [(0.0, 188), (-1.0, 137)])
+def test_pictures_show_the_tone_mapped_radiance(evaluator, tmp_path, exposure, shown) -> None:
+    """As sRGB: linear 0.5 and 0.25."""
     evaluation = evaluator.evaluate(lambda b, _: torch.log1p(torch.full_like(b, 0.5)))
-    evaluation.write_pictures(tmp_path)
+    protocol = dataclasses.replace(evaluation.protocol, exposure=exposure)
+    dataclasses.replace(evaluation, protocol=protocol).write_pictures(tmp_path)
     with Image.open(tmp_path / "hard_00_prediction.png") as picture:
-        assert np.unique(np.asarray(picture)).tolist() == [188]  # sRGB of linear 0.5
+        assert np.unique(np.asarray(picture)).tolist() == [shown]
 
 
 def test_error_picture_is_fixed_in_scale_and_marks_what_is_not_finite() -> None:
