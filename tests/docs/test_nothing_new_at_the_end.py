@@ -56,7 +56,7 @@ def test_the_sentences_are_what_the_table_says(runs: pd.DataFrame) -> None:
     number = r"(\d+\.\d % ± \d+\.\d)"
     words = (
         rf"takes {number} off hard frames and {number} off uniform ones after the same ten "
-        rf"minutes, {number} and {number} of their worst pixels"
+        rf"minutes, {number} and {number} off their worst pixels"
     )
     assert said(PAGE, words) == (scarce[0], scarce[2], scarce[1], scarce[3])
     words = rf"after as many steps on as many patches, it is {number} and {number}"

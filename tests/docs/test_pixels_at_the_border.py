@@ -54,7 +54,7 @@ def covered(resolution: int, patch_size: int, *, centred: bool) -> np.ndarray:
 def test_in_how_many_patches_pixels_are(section) -> None:
     large, small = (covered(96, size, centred=False) for size in (32, 16))
     centred, wide = covered(96, 32, centred=True), covered(256, 32, centred=False)
-    assert f"in 1/{1 / large[0, 0]:.0f} as many as the mean pixel" in section
+    assert f"in 1/{1 / large[0, 0]:.0f} as many patches as the mean pixel" in section
     assert f"in the middle in {large[48, 48]:.1f} times as many" in section
     shares = [f"{100 * (each < 0.25).mean():.0f} %" for each in (large, small, wide)]
     assert f"{shares[0]} of all pixels are in less than a quarter" in section
