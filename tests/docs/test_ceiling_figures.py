@@ -261,7 +261,7 @@ def test_what_weights_leave_of_reuse_by_loss_is_what_the_runs_say() -> None:
         return runs[runs["sampler"] == sampler].set_index("seed")
 
     page = (ROOT / "docs/exploration-ceiling/predicted-losses.md").read_text()
-    said = page.split("**Weighted back to uniform draws little")[1].split("\n")[0]
+    said = page.split("**Weighted back to uniform draws, little")[1].split("\n")[0]
     weighted, uniform = base("by_loss/weighted.csv", "uniform"), base(f"long/{MAP}", "uniform")
     for words, runs in (
         ("{} % ± {} lower in place of", weighted),
@@ -289,7 +289,7 @@ def test_what_is_said_of_how_chains_mix_is_what_their_traces_say() -> None:
         ("they accept {} to {} % of their", "acceptance", 100),
         ("only {} to {} count as", "effective_positions", 1),
         ("({} to {} by their targets", "effective_targets", 1),
-        ("they accept {} to {} %, let", "large_step_acceptance", 100),
+        ("they accept {} to {} % of these", "large_step_acceptance", 100),
     ):
         ends = (round(factor * runs[column].min()), round(factor * runs[column].max()))
         assert words.format(*ends) in said
