@@ -57,7 +57,8 @@ def test_how_many_steps_it_saves_is_what_the_runs_say() -> None:
     rows = rows_of_hours()
     scenes = pd.read_csv(FOLDER / "hour_small_patches.csv").scene
     row = [cells for scene, cells in zip(scenes, rows, strict=True) if scene == "living-room"][-1]
-    found = said(PAGE, r"after ([\d,]+) steps it has the error .*? needs ((?:more than )?[\d,]+)")
+    words = r"after ([\d,]+) steps small patches have the error .*? needs ((?:more than )?[\d,]+)"
+    found = said(PAGE, words)
     assert found == (row[0], row[-1])
     assert said(PAGE, r"has above, ([\d.]+) % after as many steps") == (row[4].lstrip("−"),)
 
