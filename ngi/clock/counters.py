@@ -13,7 +13,7 @@ class Counters:
     batches_postponed: how often stored patches were trained on because new ones were not rendered
         yet (`ngi.reuse.Reuse`'s `when_late`)
     batches_refused: rendered batches that held NaN or Inf and were replaced by other proposals'
-    steps_refused: steps not taken because the loss or its gradient was not finite (`StepGuard`)
+    steps_refused: steps skipped because the loss or its gradient was not finite (`StepGuard`)
     steps_scaled: steps whose gradient was scaled down, being far larger than the average
     """
 

@@ -179,7 +179,7 @@ class StepGuard:
 
 
 def _cause(attempt: Attempt) -> str:
-    """Of a step that is not taken."""
+    """Of a step that is skipped."""
     losses, batch, norm = attempt.losses, attempt.batch, attempt.gradient_norm
     broken = (~losses.isfinite()).nonzero().flatten().tolist()
     if broken:

@@ -67,7 +67,7 @@ def _broken_patch(conditions: Conditions, *, value: float) -> Outcome:
 def _refused_step(conditions: Conditions, disturbances: Disturbances) -> Outcome:
     trained = train(conditions, disturbances=disturbances)
     refused = trained.counters.steps_refused
-    return _compare(trained, conditions, done=f"{refused} step not taken", expected=refused == 1)
+    return _compare(trained, conditions, done=f"{refused} step skipped", expected=refused == 1)
 
 
 def _broken_loss(conditions: Conditions, *, value: float) -> Outcome:
