@@ -108,8 +108,8 @@ def test_what_the_floors_hide_of_the_study_is_what_its_runs_say() -> None:
     number = r"(\d\.\d % ± \d\.\d)"
     pattern = (
         rf"oracle takes {number} off these two on hard frames and {number} on uniform ones .+? "
-        rf"took {number} and {number} off as they are; "
-        rf"all patches {number} and {number} \({number} and {number}\)"
+        rf"instead of {number} and {number} with the noise; "
+        rf"all patches take {number} and {number} off \({number} and {number}\)"
     )
     ways = product((("oracle", 1024), ("uniform", 4096)), (1, 0), ("hard", "uniform"))
     measured = tuple(taken_off(*way) for way in ways)
@@ -141,7 +141,7 @@ def test_how_near_samplers_come_is_what_the_runs_say() -> None:
         assert cell == as_shown(difference_of(error[base], error[other]))
     anew = said(
         "docs/exploration-ceiling/README.md",
-        r"drawn anew, too, predicted losses have (.+?), .+? dear (\d.+?)\.\)",
+        r"drawn anew, too, predicted losses have (.+?), .+? expensive (\d.+?)\.\)",
     )
     of_scenes = (
         over_scenes(predicted["ours"], predicted["ours_predicted"]),
