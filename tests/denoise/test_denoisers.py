@@ -2,6 +2,7 @@
 
 import os
 import sys
+from typing import Any
 
 import pytest
 import torch
@@ -43,6 +44,22 @@ def test_most_of_the_noise_goes_and_the_brightness_stays(oidn: OpenImageDenoise)
     assert result.mean().item() == pytest.approx(clean.mean().item(), rel=0.02)
     assert torch.equal(tracing.denoise(noisy, buffers), result)
     assert torch.equal(noisy, kept)
+
+
+@pytest.mark.parametrize("settings", [{"quality": "fast"}, {"clean_guides": False}])
+def test_what_is_faster_takes_less_noise_off(
+    oidn: OpenImageDenoise, settings: dict[str, Any]
+) -> None:
+    tracing, clean = closed_form(OpenImageDenoise(**settings))
+    noisy = tracing.trace(V, resolution=SIZE)
+    buffers = tracing.renderer.image_buffers(V, resolution=SIZE)
+    best = mape(oidn(noisy, *guides(buffers, tracing.renderer.layout)), clean, 0.01)
+    assert best < mape(tracing.denoise(noisy, buffers), clean, 0.01) < mape(noisy, clean, 0.01)
+
+
+def test_a_quality_that_is_none_is_named() -> None:
+    with pytest.raises(ValueError, match="quality: 'best': choose one of high, balanced, fast"):
+        OpenImageDenoise(quality="best")
 
 
 @pytest.mark.parametrize(("probability", "shown"), [(0.5, (0.9, 1.1)), (0.001, (0.0, 0.2))])
