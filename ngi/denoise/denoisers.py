@@ -36,14 +36,14 @@ class Denoiser(Protocol):
 class OpenImageDenoise:
     """Intel's Open Image Denoise, its filter 'RT' for high dynamic range.
 
-    quality: 'high', 'balanced' or 'fast'
-    clean_guides: whether it is told that albedo and normal have no noise, which ours have not
-        (`Renderer.image_buffers`): less error, for more time
+    It is told that albedo and normal have no noise, which ours have not (`Renderer.image_buffers`).
+
+    quality: 'high', 'balanced' or 'fast', whose time is a half and a quarter of the best one's
 
     Raises ValueError for another quality, RuntimeError where the package is not installed.
     """
 
-    def __init__(self, *, quality: str = "high", clean_guides: bool = True) -> None:
+    def __init__(self, *, quality: str = "high") -> None:
         if quality not in QUALITIES:
             raise ValueError(f"quality: '{quality}': choose one of {', '.join(QUALITIES)}")
         try:
@@ -58,7 +58,7 @@ class OpenImageDenoise:
         if threads := os.environ.get("OMP_NUM_THREADS"):
             os.environ.setdefault("OIDN_NUM_THREADS", threads)
             os.environ.setdefault("OIDN_SET_AFFINITY", "0")
-        self._denoise = partial(pyoidn.denoise, hdr=True, clean_aux=clean_guides, quality=quality)
+        self._denoise = partial(pyoidn.denoise, hdr=True, clean_aux=True, quality=quality)
 
     def __call__(self, radiance: Tensor, albedo: Tensor, normal: Tensor) -> Tensor:
         denoised: Tensor = self._denoise(radiance, albedo, normal)

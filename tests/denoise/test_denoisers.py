@@ -2,7 +2,6 @@
 
 import os
 import sys
-from typing import Any
 
 import pytest
 import torch
@@ -46,11 +45,8 @@ def test_most_of_the_noise_goes_and_the_brightness_stays(oidn: OpenImageDenoise)
     assert torch.equal(noisy, kept)
 
 
-@pytest.mark.parametrize("settings", [{"quality": "fast"}, {"clean_guides": False}])
-def test_what_is_faster_takes_less_noise_off(
-    oidn: OpenImageDenoise, settings: dict[str, Any]
-) -> None:
-    tracing, clean = closed_form(OpenImageDenoise(**settings))
+def test_what_is_faster_takes_less_noise_off(oidn: OpenImageDenoise) -> None:
+    tracing, clean = closed_form(OpenImageDenoise(quality="fast"))
     noisy = tracing.trace(V, resolution=SIZE)
     buffers = tracing.renderer.image_buffers(V, resolution=SIZE)
     best = mape(oidn(noisy, *guides(buffers, tracing.renderer.layout)), clean, 0.01)

@@ -96,10 +96,7 @@ def _frames(made: Ours, resolution: int, *, repeats: int, seconds: float) -> lis
         PathTracing(
             renderer=renderer, denoiser=denoiser, samples_per_pixel=SAMPLES_PER_PIXEL, seed=0
         )
-        for denoiser in (
-            OpenImageDenoise(),
-            OpenImageDenoise(quality="fast", clean_guides=False),
-        )
+        for denoiser in (OpenImageDenoise(), OpenImageDenoise(quality="fast"))
     )
     hard = renderer.hard_frames()
     buffers = renderer.image_buffers(hard[0], resolution=resolution).cpu()
