@@ -17,7 +17,6 @@ from analysis.pairs import (
     log_errors,
     log_ratios,
     pair_runs,
-    runs_of_one_budget,
     runs_of_one_way,
     shared_metrics,
 )
@@ -64,15 +63,14 @@ def histogram_follows_target(runs: Sequence[Run], ours: Methods = PAPERS) -> lis
     Mean of the last third of the run less that of the first third, per seed; of the chains alone,
     and beyond what uniform sampling shows while the target map changes.
     """
-    never = [run for run in runs if run.label["reuse"] == "never"]
     methods = [ours.get(name, name) for name in (METHOD, "metropolis", "uniform")]
     *exploring, uniform = methods
-    present = {run.label.get("method") for run in never if run.scene == "mirror"}
-    found = runs_of_one_way(never, "mirror", *(m for m in methods if m in present))
-    without_reuse = [
+    present = {run.label.get("method") for run in runs if run.scene == "mirror"}
+    found = runs_of_one_way(runs, "mirror", *(m for m in methods if m in present))
+    in_one_way = [
         replace(run, method=method) for method, by_seed in found.items() for run in by_seed.values()
     ]
-    distances = histogram_distances(without_reuse)
+    distances = histogram_distances(in_one_way)
     if distances.empty:
         return []
     by_run = ["seed", "method"]
@@ -115,7 +113,6 @@ def many_variables_are_plausible(runs: Sequence[Run], ours: Methods = PAPERS) ->
     the interval is Bonferroni's for as many tests as there are scenes.
     """
     method = ours.get(METHOD, METHOD)
-    runs = runs_of_one_budget(runs, [(scene, (method,)) for scene in ("chess", *SEVEN_SCENES)])
     chess = _runs_of(runs, "chess", method)
     if not chess:
         return []
@@ -215,4 +212,4 @@ FINDINGS: Mapping[str, Callable[[Sequence[Run]], list[Finding]]] = {
     **_FOUND,
     **{f"ours_{id_}": partial(find, ours=methods_with_ours(id_)) for id_, find in _FOUND.items()},
 }
-"""By a claim's id; every finding decides."""
+"""By a claim's id, from runs of one budget and with the claim's reuse; every finding decides."""

@@ -14,6 +14,10 @@ SMALLEST_ERROR = 1e-6
 """Smaller errors count as this one: no reference is so exact, and 0 has no logarithm."""
 
 
+ScenesAndMethods = tuple[tuple[str, ...], tuple[str, ...]]
+"""Scenes, and methods, of which the runs of all with all are compared with each other."""
+
+
 @dataclass(frozen=True)
 class Pair:
     """Two runs of one scene and seed that differ in the method alone."""
@@ -50,39 +54,36 @@ def runs_of_one_way(runs: Sequence[Run], scene: str, *methods: str) -> dict[str,
     shared = [way for way, found in by_way.items() if len(found) == len(set(methods))]
     if not shared:
         return {}
-    return by_way[min(shared, key=lambda way: (-_pairs(by_way[way]), len(way), way))]
+    return by_way[min(shared, key=lambda way: (-len(_seeds_of_all(by_way[way])), len(way), way))]
 
 
-def runs_of_one_budget(
-    runs: Sequence[Run], compared: Sequence[tuple[str, tuple[str, ...]]]
-) -> list[Run]:
+def runs_of_one_budget(runs: Sequence[Run], compared: Sequence[ScenesAndMethods]) -> list[Run]:
     """Those of one budget: what is said of several scenes and methods is of as much training.
 
-    compared: scenes, each with methods that are compared there
-
-    Of several budgets that counts in which most of these share a seed, of several of these that
-    with most such seeds, then the first in the alphabet.
+    Of several budgets that counts in which most of `compared` share a seed, of several of these
+    that with most such seeds, then the first in the alphabet.
     """
     by_budget: dict[str, list[Run]] = {}
-    for run in sorted(runs, key=lambda run: run.label["budget"]):
-        by_budget.setdefault(run.label["budget"], []).append(run)
+    for run in sorted(runs, key=_budget):
+        by_budget.setdefault(_budget(run), []).append(run)
 
     def shared(found: Sequence[Run]) -> tuple[int, int]:
-        seeds: dict[tuple[str, str | None], set[int]] = {}
-        for run in found:
-            seeds.setdefault((run.scene, run.label.get("method")), set()).add(run.seed)
-        counts = [
-            len(set.intersection(*(seeds.get((scene, method), set()) for method in methods)))
-            for scene, methods in compared
-        ]
+        counts = [len(shared_seeds(found, *together)) for together in compared]
         return sum(map(bool, counts)), sum(counts)
 
     return max(by_budget.values(), key=shared, default=[])
 
 
-def _pairs(by_method: Mapping[str, Mapping[int, Run]]) -> int:
-    """Seeds that all methods have."""
-    return len(set.intersection(*(set(by_seed) for by_seed in by_method.values())))
+def shared_seeds(runs: Sequence[Run], scenes: Sequence[str], methods: Sequence[str]) -> set[int]:
+    """Those with which each scene was run with each method, the methods of a scene in one way."""
+    found = [runs_of_one_way(runs, scene, *methods) for scene in scenes]
+    return set.intersection(*map(_seeds_of_all, found))
+
+
+def _seeds_of_all(by_method: Mapping[str, Mapping[int, Run]]) -> set[int]:
+    """Seeds that all methods have; none without methods."""
+    seeds = [set(by_seed) for by_seed in by_method.values()]
+    return set.intersection(*seeds) if seeds else set()
 
 
 def ways_left_out(runs: Sequence[Run]) -> list[str]:
@@ -93,7 +94,7 @@ def ways_left_out(runs: Sequence[Run]) -> list[str]:
     for run in runs:
         if method := run.label.get("method"):
             ways.setdefault((run.scene, method), set()).add(_way(run))
-    budgets = sorted({str(run.label["budget"]) for run in runs if run.label.get("method")})
+    budgets = sorted({_budget(run) for run in runs if run.label.get("method")})
     several = (
         f"runs with different budgets, {', '.join(budgets)}: each claim is judged by the runs of "
         "one budget, the one in which most of its scenes have all of its methods"
@@ -116,8 +117,11 @@ def _way(run: Run) -> tuple[str, ...]:
     """Budget, experiment and overrides of a run, without its method."""
     overrides = [o for o in run.label["overrides"].split(",") if not o.startswith("method=")]
     chosen = [o for o in overrides if o and o != "default"]
-    budget, experiment = run.label["budget"], run.label["experiment"]
-    return (f"budget={budget}", f"experiment={experiment}", *chosen)
+    return (f"budget={_budget(run)}", f"experiment={run.label['experiment']}", *chosen)
+
+
+def _budget(run: Run) -> str:
+    return run.label["budget"]
 
 
 def shared_metrics(runs: Sequence[Run], set_name: str) -> list[str]:

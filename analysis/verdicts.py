@@ -9,7 +9,7 @@ from analysis.claims import CLAIMS, Claim, Comparison
 from analysis.effects import compare_on_scene, pool
 from analysis.evidence import ComparisonResult, Finding, Verdict, of_tests
 from analysis.findings import FINDINGS
-from analysis.pairs import runs_of_one_budget
+from analysis.pairs import ScenesAndMethods, runs_of_one_budget
 from analysis.runs import Run
 from analysis.sentences import in_words
 
@@ -44,9 +44,9 @@ def judge(runs: Sequence[Run]) -> list[ClaimResult]:
 
 
 def _judge(claim: Claim, runs: Sequence[Run]) -> ClaimResult:
-    if claim.comparisons:
-        compared = [(s, (c.better, c.worse)) for c in claim.comparisons for s in c.scenes]
-        runs = runs_of_one_budget(runs, compared)
+    runs = [run for run in runs if claim.reuse in (None, run.label["reuse"])]
+    compared = _compared(claim)
+    runs = runs_of_one_budget(runs, compared)
     by_comparison = [_compare(comparison, runs) for comparison in claim.comparisons]
     comparisons = tuple(result for results in by_comparison for result in results)
     findings = tuple(FINDINGS[claim.id](runs)) if claim.id in FINDINGS else ()
@@ -63,6 +63,18 @@ def _judge(claim: Claim, runs: Sequence[Run]) -> ClaimResult:
     return ClaimResult(claim, comparisons, findings, verdict, sentence)
 
 
+def _compared(claim: Claim) -> list[ScenesAndMethods]:
+    """What has to be of one budget: what its comparisons compare, and what its finding does."""
+    found: list[ScenesAndMethods] = [
+        ((s,), (c.better, c.worse)) for c in claim.comparisons for s in c.scenes
+    ]
+    if not claim.against:
+        return found
+    first = claim.comparisons[0]
+    sets = [first.scenes, *((*first.scenes, scene) for scene in claim.against)]
+    return [*found, *((scenes, (first.better,)) for scenes in sets)]
+
+
 def _of_all_scenes(comparison: Comparison, results: Sequence[ComparisonResult]) -> Verdict:
     """The last result's verdict (over all scenes or the only one), once every scene was run."""
     complete = {result.scene for result in results} >= set(comparison.scenes)
@@ -71,8 +83,6 @@ def _of_all_scenes(comparison: Comparison, results: Sequence[ComparisonResult]) 
 
 def _compare(comparison: Comparison, runs: Sequence[Run]) -> list[ComparisonResult]:
     """Per scene that was run, and where there are several, over all of them."""
-    if comparison.reuse is not None:
-        runs = [run for run in runs if run.label["reuse"] == comparison.reuse]
     found = [
         compare_on_scene(runs, scene, comparison.better, comparison.worse)
         for scene in comparison.scenes

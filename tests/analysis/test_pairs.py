@@ -1,0 +1,84 @@
+"""Which runs are compared with each other: of one budget, one way."""
+
+import pandas as pd
+import pytest
+
+from analysis import findings
+from analysis.claims import SEVEN_SCENES
+from analysis.evidence import Verdict
+from analysis.methods import name_methods
+from analysis.runs import Run, find_runs
+from analysis.verdicts import ClaimResult, judge
+
+EXPLORING, UNIFORM = "active_exploration", "uniform"
+
+
+def judged(folder) -> dict[str, ClaimResult]:  # type: ignore[no-untyped-def]
+    return {result.claim.id: result for result in judge(name_methods(find_runs(folder)[0]))}
+
+
+@pytest.fixture
+def mapped(monkeypatch) -> list[Run]:
+    """The runs whose histograms were asked for."""
+    seen: list[Run] = []
+
+    def distances(runs) -> pd.DataFrame:  # type: ignore[no-untyped-def]
+        seen.extend(runs)
+        return pd.DataFrame()
+
+    monkeypatch.setattr(findings, "histogram_distances", distances)
+    return seen
+
+
+def test_runs_with_reuse_do_not_choose_the_budget_of_a_claim_without(
+    make_method, tmp_path, mapped
+) -> None:
+    for seed in range(3):
+        for method, error in ((EXPLORING, 0.05), (UNIFORM, 0.1)):
+            mirror = {"scene": "mirror", "seed": seed}
+            make_method(method, **mirror, error=error, reuse="never", budget="small")
+            make_method(method, **mirror, budget="hour")
+            make_method(method, **mirror, budget="small")
+    (comparison,) = judged(tmp_path)["histogram"].comparisons
+    assert comparison.decisive.seeds == 3
+    assert comparison.decisive.effect_percent == pytest.approx(-50, abs=5)
+    assert {(run.label["reuse"], run.label["budget"]) for run in mapped} == {("never", "small")}
+    assert len(mapped) == 6
+
+
+def test_runs_that_make_no_pair_do_not_choose_the_budget(make_method, tmp_path) -> None:
+    """At an hour the two methods were run in two ways."""
+    for seed in range(3):
+        for method, error in ((EXPLORING, 0.05), ("no_preconditioning", 0.1)):
+            make_method(method, seed=seed, error=error, budget="small")
+        make_method(EXPLORING, seed=seed, budget="hour", overrides="loss.l1_weight=2")
+        make_method("no_preconditioning", seed=seed, budget="hour")
+    (comparison,) = judged(tmp_path)["preconditioning"].comparisons
+    assert comparison.decisive.effect_percent == pytest.approx(-50, abs=5)
+
+
+@pytest.mark.parametrize("with_uniform", [True, False])
+def test_chess_is_judged_at_the_budget_of_the_scenes_beside_it(
+    make_method, tmp_path, with_uniform
+) -> None:
+    for budget, error in (("hour", 0.4), ("small", 0.1)):
+        for method in (EXPLORING, UNIFORM) if with_uniform else (EXPLORING,):
+            for seed in range(2):
+                make_method(method, scene="chess", seed=seed, budget=budget, error=error)
+    for scene in SEVEN_SCENES:
+        for seed in range(2):
+            make_method(EXPLORING, scene=scene, seed=seed, budget="small", error=0.2)
+    worst, _ = judged(tmp_path)["chess"].findings
+    assert "7 scenes" in worst.text
+    assert worst.value == pytest.approx(-50, abs=5)
+
+
+def test_chess_is_judged_where_it_was_run_though_the_scenes_beside_were_not(
+    make_method, tmp_path
+) -> None:
+    make_method(EXPLORING, scene="chess", budget="small")
+    for scene in SEVEN_SCENES:
+        make_method(EXPLORING, scene=scene, budget="hour")
+    result = judged(tmp_path)["chess"]
+    assert len(result.findings) == 2
+    assert result.verdict is Verdict.INCONCLUSIVE
