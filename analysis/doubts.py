@@ -53,7 +53,7 @@ def comparison_warnings(runs: Sequence[Run]) -> list[str]:
         )
     for what, value in (
         ("were made with different commits", _commits),
-        ("were timed by different clocks", _clock),
+        ("were timed by different clocks", lambda run: run.clock),
         ("come from different machines", partial(_machine, parts=_machine_parts(runs))),
     ):
         first: dict[str, Path] = {}
@@ -100,12 +100,6 @@ def _settings(config: dict[str, Any]) -> dict[str, Any]:
     found = pd.json_normalize({key: part for key, part in config.items() if key != "costs"})
     settings = {str(key): value for key, value in found.iloc[0].items()}
     return {key: value for key, value in settings.items() if key.split(".")[-1] != "seed"}
-
-
-def _clock(run: Run) -> str:
-    """'wall', or 'model' where run time was counted with measured costs per step."""
-    clock: str = run.result.get("clock", "wall")
-    return clock
 
 
 def _commits(run: Run) -> str:

@@ -58,7 +58,8 @@ def runs_of_one_way(runs: Sequence[Run], scene: str, *methods: str) -> dict[str,
 
 
 def runs_of_one_budget(runs: Sequence[Run], compared: Sequence[ScenesAndMethods]) -> list[Run]:
-    """Those of one budget: what is said of several scenes and methods is of as much training.
+    """Those of one budget and clock: what is said of several scenes and methods is of as much
+    training.
 
     Of several budgets that counts in which most of `compared` share a seed, of several of these
     that with most such seeds, then the first in the alphabet.
@@ -114,14 +115,16 @@ def pair_by_seed(better: Mapping[int, Run], worse: Mapping[int, Run]) -> list[Pa
 
 
 def _way(run: Run) -> tuple[str, ...]:
-    """Budget, experiment and overrides of a run, without its method."""
+    """Budget, clock, experiment and overrides of a run, without its method."""
     overrides = [o for o in run.label["overrides"].split(",") if not o.startswith("method=")]
     chosen = [o for o in overrides if o and o != "default"]
     return (f"budget={_budget(run)}", f"experiment={run.label['experiment']}", *chosen)
 
 
 def _budget(run: Run) -> str:
-    return run.label["budget"]
+    """By the name that folders of sweeps have: what another clock counts is another budget."""
+    budget = run.label["budget"]
+    return budget if run.clock == "wall" else f"{budget}-{run.clock}-clock"
 
 
 def shared_metrics(runs: Sequence[Run], set_name: str) -> list[str]:

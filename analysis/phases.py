@@ -28,7 +28,7 @@ def phase_table(runs: Sequence[Run]) -> Table:
         of_scene = [run for run in runs if run.scene == scene]
         for method in methods_in_order(of_scene):
             group = [run for run in of_scene if run.method == method]
-            clocks = sorted({run.result.get("clock", "wall") for run in group})
+            clocks = sorted({run.clock for run in group})
             seconds = [[run.result["seconds"].get(phase) for run in group] for phase in _PHASES]
             values = [
                 *seconds,

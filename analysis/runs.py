@@ -54,6 +54,12 @@ class Run:
         return seed
 
     @property
+    def clock(self) -> str:
+        """'wall', or 'model' where run time was counted with measured costs per step."""
+        clock: str = self.result.get("clock", "wall")
+        return clock
+
+    @property
     def versions(self) -> list[dict[str, Any]]:
         """Of the program, in order: 'commit', 'dirty' and perhaps 'code', a hash over its modules.
 

@@ -1,4 +1,4 @@
-"""Which runs are compared with each other: of one budget, one way."""
+"""Which runs are compared with each other: of one budget, one clock, one way."""
 
 import pandas as pd
 import pytest
@@ -7,10 +7,13 @@ from analysis import findings
 from analysis.claims import SEVEN_SCENES
 from analysis.evidence import Verdict
 from analysis.methods import name_methods
+from analysis.pairs import ways_left_out
 from analysis.runs import Run, find_runs
 from analysis.verdicts import ClaimResult, judge
+from tests.analysis.changes import set_value
 
 EXPLORING, UNIFORM = "active_exploration", "uniform"
+BY_THE_MODEL = set_value("clock", value="model")
 
 
 def judged(folder) -> dict[str, ClaimResult]:  # type: ignore[no-untyped-def]
@@ -82,3 +85,24 @@ def test_chess_is_judged_where_it_was_run_though_the_scenes_beside_were_not(
     result = judged(tmp_path)["chess"]
     assert len(result.findings) == 2
     assert result.verdict is Verdict.INCONCLUSIVE
+
+
+def test_runs_of_two_clocks_are_not_paired(make_method, tmp_path) -> None:
+    """Seconds that were counted with measured costs are none of the machine's."""
+    for seed in range(3):
+        make_method(EXPLORING, seed=seed, error=0.05, change=BY_THE_MODEL)
+        make_method("no_preconditioning", seed=seed)
+    assert judged(tmp_path)["preconditioning"].verdict is Verdict.NOT_RUN
+    assert ways_left_out(find_runs(tmp_path)[0])[0].startswith(
+        "runs with different budgets, seconds, seconds-model-clock: "
+    )
+    for seed in range(3, 5):
+        make_method("no_preconditioning", seed=seed, change=BY_THE_MODEL)
+        make_method(EXPLORING, seed=seed, error=0.05, change=BY_THE_MODEL)
+    (comparison,) = judged(tmp_path)["preconditioning"].comparisons
+    assert comparison.decisive.seeds == 2
+    lines = ways_left_out(find_runs(tmp_path)[0])
+    assert (
+        "no_preconditioning was run in 2 ways (budget=seconds experiment=demo; "
+        "budget=seconds-model-clock experiment=demo)" in lines[1]
+    )
