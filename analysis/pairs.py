@@ -50,7 +50,7 @@ def runs_of_one_way(runs: Sequence[Run], scene: str, *methods: str) -> dict[str,
     for run in runs:
         method = run.label.get("method")
         if run.scene == scene and method in methods:
-            by_way.setdefault(_way(run), {}).setdefault(method, {})[run.seed] = run
+            by_way.setdefault(way_of(run), {}).setdefault(method, {})[run.seed] = run
     shared = [way for way, found in by_way.items() if len(found) == len(set(methods))]
     if not shared:
         return {}
@@ -94,7 +94,7 @@ def ways_left_out(runs: Sequence[Run]) -> list[str]:
     ways: dict[tuple[str, str], set[tuple[str, ...]]] = {}
     for run in runs:
         if method := run.label.get("method"):
-            ways.setdefault((run.scene, method), set()).add(_way(run))
+            ways.setdefault((run.scene, method), set()).add(way_of(run))
     budgets = sorted({_budget(run) for run in runs if run.label.get("method")})
     several = (
         f"runs with different budgets, {', '.join(budgets)}: each claim is judged by the runs of "
@@ -114,7 +114,7 @@ def pair_by_seed(better: Mapping[int, Run], worse: Mapping[int, Run]) -> list[Pa
     return [Pair(better[seed], worse[seed]) for seed in sorted(better.keys() & worse.keys())]
 
 
-def _way(run: Run) -> tuple[str, ...]:
+def way_of(run: Run) -> tuple[str, ...]:
     """Budget, clock, experiment and overrides of a run, without its method."""
     overrides = [o for o in run.label["overrides"].split(",") if not o.startswith("method=")]
     chosen = [o for o in overrides if o and o != "default"]

@@ -66,9 +66,9 @@ def write_report(folder: Path, output: Path, *, baseline: str | None = None) -> 
     runs = name_methods(runs)
     check_comparable(runs)
     base = _baseline(baseline, runs)
-    doubts = comparison_warnings(runs) + ways_left_out(runs)
     summaries, styles = summarise(runs), method_styles(runs)
     comparisons, claims = compare(summaries, baseline=base), judge(runs)
+    doubts = _doubts(runs, claims)
     notes = _notes(runs, claims)
     films, unreadable = film_tables(folder, runs)
     found, frames = claims_table(claims), frame_table(runs)
@@ -105,6 +105,12 @@ def write_report(folder: Path, output: Path, *, baseline: str | None = None) -> 
     write_page(contents, page, lambda parts: _progress(parts, "page"))
     text = _text(summaries, comparisons, [found, frames], films, notes)
     return Report(text, [page, *files, *exploration], warnings)
+
+
+def _doubts(runs: Sequence[Run], claims: Sequence[ClaimResult]) -> list[str]:
+    """What makes comparisons and verdicts doubtful, a line each."""
+    of_claims = [doubt for claim in claims for doubt in claim.doubts]
+    return [*comparison_warnings(runs), *ways_left_out(runs), *of_claims]
 
 
 def _baseline(asked_for: str | None, runs: Sequence[Run]) -> str:

@@ -9,7 +9,13 @@ from analysis.claims import CLAIMS, Claim, Comparison
 from analysis.effects import compare_on_scene, pool
 from analysis.evidence import ComparisonResult, Finding, Verdict, of_tests
 from analysis.findings import FINDINGS
-from analysis.pairs import ScenesAndMethods, runs_of_one_budget
+from analysis.pairs import (
+    ScenesAndMethods,
+    runs_of_one_budget,
+    runs_of_one_way,
+    shared_seeds,
+    way_of,
+)
 from analysis.runs import Run
 from analysis.sentences import in_words
 
@@ -19,7 +25,7 @@ class ClaimResult:
     """A claim, the evidence, and what to make of it.
 
     comparisons: per scene, then over all scenes where there are several; sentence: the verdict in
-    words; for a claim without runs both tuples are empty.
+    words; doubts: why to doubt it, a line each; for a claim without runs the tuples are empty.
     """
 
     claim: Claim
@@ -27,6 +33,7 @@ class ClaimResult:
     findings: tuple[Finding, ...]
     verdict: Verdict
     sentence: str
+    doubts: tuple[str, ...]
 
 
 def judge(runs: Sequence[Run]) -> list[ClaimResult]:
@@ -60,7 +67,8 @@ def _judge(claim: Claim, runs: Sequence[Run]) -> ClaimResult:
         tests = [*found, *tests] if claim.primary == "finding" else [*tests, *found]
     verdict = of_tests(tests[0], tests[1:]) if comparisons or findings else Verdict.NOT_RUN
     sentence = in_words(claim, verdict, by_comparison, findings)
-    return ClaimResult(claim, comparisons, findings, verdict, sentence)
+    doubts = tuple(_different_ways(claim, runs, compared))
+    return ClaimResult(claim, comparisons, findings, verdict, sentence, doubts)
 
 
 def _compared(claim: Claim) -> list[ScenesAndMethods]:
@@ -73,6 +81,25 @@ def _compared(claim: Claim) -> list[ScenesAndMethods]:
     first = claim.comparisons[0]
     sets = [first.scenes, *((*first.scenes, scene) for scene in claim.against)]
     return [*found, *((scenes, (first.better,)) for scenes in sets)]
+
+
+def _different_ways(
+    claim: Claim, runs: Sequence[Run], compared: Sequence[ScenesAndMethods]
+) -> list[str]:
+    """A line where the runs that count were not all made in one way; `runs_of_one_way` sees to it
+    for a scene alone.
+    """
+    scenes: dict[str, dict[str, None]] = {}
+    for together, methods in compared:
+        if shared_seeds(runs, together, methods):
+            for scene in together:
+                by_seed = runs_of_one_way(runs, scene, *methods)[methods[0]]
+                way = " ".join(way_of(next(iter(by_seed.values()))))
+                scenes.setdefault(way, {})[scene] = None
+    if len(scenes) < 2:
+        return []
+    ways = "; ".join(f"{way} on {', '.join(found)}" for way, found in scenes.items())
+    return [f"{claim.id} is judged by runs that were made in different ways: {ways}"]
 
 
 def _of_all_scenes(comparison: Comparison, results: Sequence[ComparisonResult]) -> Verdict:

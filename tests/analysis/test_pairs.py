@@ -4,10 +4,11 @@ import pandas as pd
 import pytest
 
 from analysis import findings
-from analysis.claims import SEVEN_SCENES
+from analysis.claims import SALONS, SEVEN_SCENES
 from analysis.evidence import Verdict
 from analysis.methods import name_methods
 from analysis.pairs import ways_left_out
+from analysis.report import main
 from analysis.runs import Run, find_runs
 from analysis.verdicts import ClaimResult, judge
 from tests.analysis.changes import set_value
@@ -106,3 +107,47 @@ def test_runs_of_two_clocks_are_not_paired(make_method, tmp_path) -> None:
         "no_preconditioning was run in 2 ways (budget=seconds experiment=demo; "
         "budget=seconds-model-clock experiment=demo)" in lines[1]
     )
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_scenes_that_were_run_in_different_ways_are_said(make_method, tmp_path, capsys) -> None:
+    for method in (EXPLORING, "metropolis"):
+        make_method(method, scene="sphere-caustic")
+        make_method(method, scene="living-room", overrides="loss.l1_weight=2")
+    told = (
+        "acceptance is judged by runs that were made in different ways: budget=seconds "
+        "experiment=demo on sphere-caustic; budget=seconds experiment=demo loss.l1_weight=2 on "
+        "living-room"
+    )
+    assert judged(tmp_path)["acceptance"].doubts == (told,)
+    assert main([str(tmp_path)]) == 0
+    assert told in capsys.readouterr().err
+    assert f"Warning: {told}" in (tmp_path / "report" / "results.md").read_text()
+
+
+def test_what_findings_compare_is_looked_through_for_different_ways(make_method, tmp_path) -> None:
+    make_method(EXPLORING, scene="chess")
+    make_method(EXPLORING, scene="bedroom", overrides="loss.l1_weight=2")
+    for salon in SALONS:
+        for method in (EXPLORING, UNIFORM):
+            overrides = "loss.l1_weight=2" if salon == SALONS[-1] else "default"
+            make_method(method, scene=salon, overrides=overrides)
+    results = judged(tmp_path)
+    assert (
+        results["chess"]
+        .doubts[0]
+        .endswith("on chess; budget=seconds experiment=demo loss.l1_weight=2 on bedroom")
+    )
+    assert "loss.l1_weight=2 on salon-25" in results["dimensions"].doubts[0]
+    assert results["same_time"].doubts == ()
+
+
+def test_runs_of_one_way_are_no_doubt(make_method, tmp_path) -> None:
+    """Whatever else there is, and whatever ways other claims are judged by."""
+    for scene in ("sphere-caustic", "living-room"):
+        for method in (EXPLORING, "metropolis"):
+            make_method(method, scene=scene)
+    make_method("metropolis", seed=1, overrides="loss.l1_weight=2")
+    for method in (EXPLORING, UNIFORM):
+        make_method(method, scene="mirror", reuse="never", overrides="reuse=never")
+    assert [line for result in judged(tmp_path).values() for line in result.doubts] == []
