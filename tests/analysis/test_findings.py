@@ -120,6 +120,26 @@ def test_what_no_scene_was_run_for_may_be_worse_than_chess(make_method, tmp_path
     assert every.verdict is Verdict.NOT_REPRODUCED
 
 
+@pytest.mark.parametrize("diverged", [SEVEN_SCENES[0], SEVEN_SCENES[-1]])
+def test_a_scene_where_a_seed_diverged_may_be_the_worst(make_method, tmp_path, diverged) -> None:
+    """Without it some of the seven are known; that chess is above the worst of all is not."""
+    for seed in range(3):
+        make_method("active_exploration", scene="chess", seed=seed, error=0.4)
+        for scene in SEVEN_SCENES:
+            value = math.nan if (scene, seed) == (diverged, 1) else 0.1
+
+            def spoil(result: dict, value: float = value) -> None:
+                result["frames"][0]["dssim"] *= value / 0.1
+
+            make_method("active_exploration", scene=scene, seed=seed, error=0.1, change=spoil)
+    worst, _ = many_variables_are_plausible(find_runs(tmp_path)[0])
+    assert "worst of 6 scenes" in worst.text
+    assert diverged not in worst.text
+    assert worst.value == pytest.approx(300, abs=30)
+    assert worst.low > 0
+    assert worst.verdict is Verdict.INCONCLUSIVE
+
+
 def test_choosing_the_worst_scene_widens_the_interval(make_method, tmp_path) -> None:
     for seed in range(3):
         make_method("active_exploration", scene="chess", seed=seed, error=0.1, spread=0.3)
