@@ -115,7 +115,10 @@ def _over_time(runs: Sequence[Run], styles: Styles) -> Figure:
 
 
 def _histograms(runs: Sequence[Run], plane: str) -> Figure:
-    """Two rows per method, target density above histogram, each on one colour scale."""
+    """Two rows per method, target density above histogram, each on one colour scale.
+
+    A map that is no density is left blank.
+    """
     shown = {
         method: _evenly(windows(_first_seed(runs, method), plane))
         for method in methods_in_order(runs)
@@ -130,7 +133,9 @@ def _histograms(runs: Sequence[Run], plane: str) -> Figure:
     }
     images = {}
     for row, kind in enumerate(("target density", "chains' states")):
-        top = np.quantile([pair[row] for pairs in pictures.values() for pair in pairs], BRIGHTEST)
+        cells = np.array([pair[row] for pairs in pictures.values() for pair in pairs])
+        known = cells[np.isfinite(cells)]
+        top = np.quantile(known, BRIGHTEST) if known.size else 1.0
         for line, (method, pairs) in zip(rows[row::2], pictures.items(), strict=True):
             images[kind] = _maps(line, [pair[row] for pair in pairs], top=float(top))
             line[0].set_ylabel(f"{title(method)}\n{kind}\n{up}", fontsize=8)

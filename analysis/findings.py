@@ -61,7 +61,8 @@ def histogram_follows_target(runs: Sequence[Run], ours: Methods = PAPERS) -> lis
     """Change of the distance between the samples' histogram and the target map over a run.
 
     Mean of the last third of the run less that of the first third, per seed; of the chains alone,
-    and beyond what uniform sampling shows while the target map changes.
+    and beyond what uniform sampling shows while the target map changes. NaN, and inconclusive,
+    where a distance in one of these thirds is not known.
     """
     methods = [ours.get(name, name) for name in (METHOD, "metropolis", "uniform")]
     *exploring, uniform = methods
@@ -75,15 +76,24 @@ def histogram_follows_target(runs: Sequence[Run], ours: Methods = PAPERS) -> lis
         return []
     by_run = ["seed", "method"]
     ends = distances.groupby(by_run)["run_seconds"].transform("max")
-    early = distances[distances["run_seconds"] <= ends / 3].groupby(by_run)["distance"].mean()
-    late = distances[distances["run_seconds"] > 2 * ends / 3].groupby(by_run)["distance"].mean()
-    changes = (late - early).unstack("method").reindex(columns=methods)
+    early, late = (
+        distances[third].groupby(by_run)["distance"].mean(skipna=False)
+        for third in (
+            distances["run_seconds"] <= ends / 3,
+            distances["run_seconds"] > 2 * ends / 3,
+        )
+    )
+    changes = _difference(late, early)
+    by_method = {
+        method: changes[changes.index.get_level_values("method") == method].droplevel("method")
+        for method in methods
+    }
     findings = []
     for method in exploring:
         text = f"distance of histogram and target map under {method}, last less first third"
-        findings.append(_finding(text, changes[method].dropna()))
-        beyond = changes[method] - changes[uniform]
-        findings.append(_finding(f"{text}, beyond uniform's change", beyond.dropna()))
+        findings.append(_finding(text, by_method[method]))
+        beyond = _difference(by_method[method], by_method[uniform])
+        findings.append(_finding(f"{text}, beyond uniform's change", beyond))
     return findings
 
 
@@ -164,13 +174,20 @@ def _log_change(run: Run, keys: Sequence[str]) -> float:
     return float(np.mean([log_error(b) - log_error(a) for a, b in zip(first, last, strict=True)]))
 
 
+def _difference(one: pd.Series, other: pd.Series) -> pd.Series:
+    """Of what both have; NaN where it is not known of one."""
+    ours, others = one.align(other, join="inner")
+    difference: pd.Series = ours - others
+    return difference
+
+
 def _finding(text: str, values: pd.Series) -> Finding:
-    """The mean of a value per seed, claimed to be negative; inconclusive without any."""
+    """The mean of a value per seed, claimed to be negative; inconclusive without any, or if NaN."""
     if values.empty:
         return Finding(text, math.nan, None, None, Verdict.INCONCLUSIVE)
     low = high = None
-    mean = float(values.mean())
-    if len(values) > 1:
+    mean = float(values.to_numpy().mean())
+    if len(values) > 1 and math.isfinite(mean):
         low, high = bootstrap_interval(mean, [values.to_numpy()])
     return Finding(text, mean, low, high, decide(low, high))
 

@@ -43,6 +43,7 @@ from analysis.tables import (
     to_terminal,
     worst_table,
 )
+from analysis.target_map import warnings_of_maps
 from analysis.verdicts import ClaimResult, judge
 
 
@@ -108,9 +109,9 @@ def write_report(folder: Path, output: Path, *, baseline: str | None = None) -> 
 
 
 def _doubts(runs: Sequence[Run], claims: Sequence[ClaimResult]) -> list[str]:
-    """What makes comparisons and verdicts doubtful, a line each."""
+    """What makes comparisons, maps and verdicts doubtful, a line each."""
     of_claims = [doubt for claim in claims for doubt in claim.doubts]
-    return [*comparison_warnings(runs), *ways_left_out(runs), *of_claims]
+    return [*comparison_warnings(runs), *ways_left_out(runs), *warnings_of_maps(runs), *of_claims]
 
 
 def _baseline(asked_for: str | None, runs: Sequence[Run]) -> str:

@@ -47,7 +47,7 @@ class Window:
     """The time between two evaluations, of which the later one measured the target density.
 
     step, run_seconds: at its end
-    density: [g, g] target density at its end; sums up to 1
+    density: [g, g] target density at its end; sums up to 1, or is NaN throughout
     counts: [n, g, g] how often each of n chains stood in a cell, after every generated batch
     The first index is the cell along the first scene variable.
     """
@@ -89,14 +89,40 @@ def windows(run: Run, plane: str = "scene") -> list[Window]:
     return found
 
 
+def warnings_of_maps(runs: Sequence[Run]) -> list[str]:
+    """A line that names the runs of which a map is no density, if there are any."""
+    maps = [(run.folder, read_records(run.folder / "target_map.bin")) for run in runs]
+    unknown = [
+        str(folder)
+        for folder, records in maps
+        if records is not None and not all(map(_is_density, records["target"]))
+    ]
+    if not unknown:
+        return []
+    return [
+        f"{len(unknown)} run(s) have target maps that are not finite, or 0 everywhere, so that how "
+        f"closely chains follow them is not known: {', '.join(unknown)}"
+    ]
+
+
+def _is_density(target: np.ndarray) -> bool:
+    """Whether target densities of a map's patches can be made to sum up to 1."""
+    return bool(np.isfinite(target).all() and target.any())
+
+
 def _coordinates(states: np.ndarray, plane: str) -> np.ndarray:
     """[n, 2] the two coordinates of states [..., 4] that span the plane."""
     return states.reshape(-1, 4)[:, PLANES[plane]]
 
 
 def _density(record: np.void, plane: str, cells: int) -> np.ndarray:
-    """[cells, cells] mean target density of the map's patches in each cell, summing up to 1."""
+    """[cells, cells] mean target density of the map's patches in each cell, summing up to 1.
+
+    NaN throughout where the map is no density.
+    """
     states, target = _coordinates(record["state"], plane), record["target"].ravel()
+    if not _is_density(target):
+        return np.full((cells, cells), np.nan)
     mean = _histogram(states, cells, target) / np.maximum(_histogram(states, cells), 1)
     density: np.ndarray = mean / mean.sum()
     return density
@@ -125,6 +151,7 @@ def histogram_distances(runs: Sequence[Run], plane: str = "scene") -> pd.DataFra
     gain_error: its standard error, from the chains' own gains
     gain_of_target: that of independent states of the target density; chains above it are even more
         often where it is high
+    All but `states` are NaN where the map is no density.
     """
     rows = []
     for run in runs:
@@ -151,7 +178,9 @@ def _distances(counts: np.ndarray, density: np.ndarray) -> np.ndarray:
 
 
 def _expected_distance(drawn_from: np.ndarray, density: np.ndarray, states: int) -> float:
-    """Mean distance from `density` of histograms of independent states."""
+    """Mean distance from `density` of histograms of independent states; NaN from NaN."""
+    if np.isnan(density).any():
+        return np.nan
     generator = np.random.default_rng(0)
     counts = generator.multinomial(states, drawn_from.ravel(), size=SIMULATIONS)
     return float(_distances(counts.reshape(-1, *density.shape), density).mean())

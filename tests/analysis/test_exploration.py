@@ -100,6 +100,20 @@ def test_figures_of_scenes_with_a_trace_are_written(runs: list[Run], tmp_path: P
     assert "uniform sampling" in (tmp_path / "histogram_scene_mirror.svg").read_text()
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.usefixtures("undrawn")
+@pytest.mark.parametrize("steps", [[], [40, 80]])
+def test_maps_that_are_no_density_leave_the_figures_of_the_others(
+    runs: list[Run], tmp_path: Path, steps: list[int]
+) -> None:
+    for run in runs[: 4 if not steps else 1]:
+        (run.folder / "target_map.bin").unlink(missing_ok=True)
+        if steps:
+            write_maps(run.folder, 1 + np.arange(64.0).reshape(8, 8), steps)
+        write_maps(run.folder, np.zeros((8, 8)), [COUNT])
+    assert len(write_exploration_figures(runs, method_styles(runs), tmp_path)) == 8
+
+
 def test_runs_without_a_trace_leave_nothing_to_show(runs: list[Run], tmp_path: Path) -> None:
     without = [run for run in runs if run.scene == "sphere-caustic"]
     assert write_exploration_figures(without, method_styles(without), tmp_path) == []

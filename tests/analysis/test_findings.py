@@ -268,6 +268,32 @@ def test_maps_of_methods_run_in_several_ways_are_not_mixed(
     assert sorted(seen) == [("active_exploration", 0), ("uniform", 0)]
 
 
+def test_a_map_that_is_not_known_leaves_open_what_its_seed_would_say(
+    make_method, tmp_path, monkeypatch
+) -> None:
+    """Of two windows in a third of the run one is not known; a seed less were another test."""
+    methods = ("active_exploration", "metropolis", "uniform")
+    for method in methods:
+        make_method(method, scene="mirror")
+    rows = [
+        {"method": method, "seed": seed, "run_seconds": seconds, "distance": distance + seed / 1000}
+        for method in methods
+        for seed in range(3)
+        for seconds, distance in ((10.0, 0.5), (50.0, math.nan), (80.0, 0.3), (90.0, 0.3))
+        if (method, seed) != ("uniform", 2)
+    ]
+    distances = pd.DataFrame(rows)
+    unknown = (distances["method"] == "metropolis") & (distances["seed"] == 0)
+    distances.loc[unknown & (distances["run_seconds"] == 80.0), "distance"] = math.nan
+    monkeypatch.setattr(findings, "histogram_distances", lambda _: distances)
+    own, own_beyond, other, other_beyond = histogram_follows_target(find_runs(tmp_path)[0])
+    assert (own.value, own_beyond.value) == (pytest.approx(-0.2), pytest.approx(0.0, abs=1e-9))
+    assert own.verdict is Verdict.REPRODUCED
+    assert math.isnan(other.value)
+    assert math.isnan(other_beyond.value)
+    assert other.verdict is other_beyond.verdict is Verdict.INCONCLUSIVE
+
+
 def test_without_the_methods_own_runs_no_other_test_decides(
     make_method, tmp_path, monkeypatch
 ) -> None:

@@ -5,7 +5,12 @@ import pandas as pd
 import pytest
 
 from analysis.runs import Run
-from analysis.target_map import PATCHES_PER_CELL, histogram_distances, windows
+from analysis.target_map import (
+    PATCHES_PER_CELL,
+    histogram_distances,
+    warnings_of_maps,
+    windows,
+)
 from tests.analysis.traces import CHAINS, write_maps, write_trace
 
 CELLS = 8
@@ -124,10 +129,32 @@ def test_correlation_within_a_chain_is_no_gain(tmp_path: Path) -> None:
     assert 0.5 < table["gain"].std() / table["gain_error"].mean() < 2
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("plane", ["scene", "patch"])
+@pytest.mark.parametrize("value", [np.nan, np.inf, 0.0])
+def test_the_distance_from_a_map_that_is_no_density_is_not_known(
+    tmp_path: Path, value: float, plane: str
+) -> None:
+    good, run = (make(tmp_path / name, DENSITY) for name in ("good", "bad"))
+    (run.folder / "target_map.bin").unlink()
+    write_maps(run.folder, DENSITY, STEPS[:1])
+    bad = np.vstack([DENSITY[:-1], np.full((1, CELLS), value)]) if value else 0 * DENSITY
+    write_maps(run.folder, bad, STEPS[1:])
+    table, expected = (histogram_distances([one], plane) for one in (run, good))
+    pd.testing.assert_frame_equal(table.iloc[:1], expected.iloc[:1])
+    of_the_chains = ["scene", "method", "seed", "step", "run_seconds", "states"]
+    pd.testing.assert_frame_equal(table[of_the_chains], expected[of_the_chains])
+    assert table.iloc[1].drop(of_the_chains).isna().all()
+    (warning,) = warnings_of_maps([good, run])
+    assert warning.startswith("1 run(s) have target maps that are not finite, or 0 everywhere")
+    assert warning.endswith(f": {run.folder}")
+
+
 @pytest.mark.parametrize("file", ["chains.bin", "target_map.bin"])
 def test_runs_without_map_or_trace_have_no_rows(tmp_path: Path, file: str) -> None:
     run = make(tmp_path / "run", DENSITY)
     (run.folder / file).unlink()
     table = histogram_distances([run])
     assert table.empty
+    assert warnings_of_maps([run]) == []
     assert {"scene", "method", "seed", "step", "run_seconds", "distance"} < set(table.columns)
