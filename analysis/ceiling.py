@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from collections.abc import Hashable, Sequence
 from pathlib import Path
@@ -80,24 +81,48 @@ def metrics_counted(runs: pd.DataFrame) -> str:
     return f"The error is the geometric mean of {', '.join(names)}{lacking}."
 
 
+def diverged_runs(runs: pd.DataFrame) -> list[str]:
+    """A sentence that names them, where there are any."""
+    lost = runs[_diverged(runs, *SETS)].sort_values(RUN)
+    named = [
+        f"{run['scene']}, {run['patches']} patches, {run['steps']} steps, {run['choice']}, "
+        f"seed {run['seed']}"
+        for run in lost[RUN].to_dict("records")
+    ]
+    return [
+        f"{len(named)} run(s) ended with errors that are not finite, and so do means with them: "
+        f"{'; '.join(named)}."
+    ] * bool(named)
+
+
+def _diverged(runs: pd.DataFrame, *sets: str) -> pd.Series:
+    """Whether the errors on any of these sets are not finite."""
+    return ~(runs[[f"{frames}_error" for frames in sets]].abs() < math.inf).all(axis=1)
+
+
 def differences(runs: pd.DataFrame) -> pd.DataFrame:
     """A row per scene, number of steps and patches, choice and error.
 
     Columns: these, uniform (mean error of uniform choice), difference (relative, of the choice to
     uniform choice, mean over the seeds that both have), half_width (of its 95 % interval, NaN for
-    one seed) and n, of seeds. Where there are several scenes, `EVERYWHERE` stands for all, whose n
-    is that of scenes. Runs on as many patches as only uniform choice was made of, which is all of
-    the pool, are the choice `NO_CHOICE` for every other number.
+    one seed) and n, of seeds; with a run that diverged the means are not finite. Where there are
+    several scenes, `EVERYWHERE` stands for all, whose n is that of scenes. Runs on a scene's most
+    patches, where only uniform choice was made of them, are on all of the pool, and the choice
+    `NO_CHOICE` for every other number.
     """
     rows = []
-    runs = runs.assign(pair=pd.MultiIndex.from_frame(runs[["scene", "seed"]]).to_flat_index())
+    runs = runs.assign(
+        pair=pd.MultiIndex.from_frame(runs[["scene", "seed"]]).to_flat_index(),
+        most=runs["patches"] == runs.groupby("scene")["patches"].transform("max"),
+    )
     errors = [error for error in ERRORS if error in runs]
     everywhere = runs.assign(scene=EVERYWHERE)
     both = pd.concat([runs, everywhere]) if runs["scene"].nunique() > 1 else runs
     for (scene, steps), of_steps in both.groupby(["scene", "steps"], sort=False):
         difference = difference_over_scenes if scene == EVERYWHERE else paired_difference
         compared = set(of_steps.loc[of_steps["choice"] != BASELINE, "patches"])
-        everything = of_steps[~of_steps["patches"].isin(compared)].assign(choice=NO_CHOICE)
+        everything = of_steps[of_steps["most"] & ~of_steps["patches"].isin(compared)]
+        everything = everything.assign(choice=NO_CHOICE)
         for patches in sorted(compared):
             here = pd.concat([of_steps[of_steps["patches"] == patches], everything])
             for choice in [c for c in here["choice"].unique() if c != BASELINE]:
@@ -140,20 +165,24 @@ def table(found: pd.DataFrame, error: str) -> Table:
 def concentration(runs: pd.DataFrame) -> Table:
     """Share of the true error that the worst 5 % of patches hold after uniform choice.
 
-    A row per scene, number of steps and patches. Where all patches are equally wrong it
-    is 5 %; the nearer it is, the less there is for a choice to find.
+    A row per scene, number of steps and patches; runs that diverged have no share, and do not
+    count. Where all patches are equally wrong it is 5 %; the nearer it is, the less there is for a
+    choice to find.
     """
     rows = []
     told = runs[runs["choice"] == BASELINE]
     for (scene, steps, patches), group in told.groupby(["scene", "steps", "patches"]):
-        mean = f"{100 * group['worst_share'].mean():.1f} %"
-        rows.append(tuple(map(Cell, (str(scene), f"{steps}", f"{patches}", mean, f"{len(group)}"))))
+        shares = group["worst_share"]
+        texts = (f"{steps}", f"{patches}", f"{100 * shares.mean():.1f} %", f"{shares.count()}")
+        rows.append(tuple(map(Cell, (str(scene), *texts))))
     columns = ("scene", "steps", "patches", "error that the worst 5 % of patches hold", "runs")
     return Table("How concentrated the error is", columns, tuple(rows), 1)
 
 
 def _by_pair(runs: pd.DataFrame, choice: str, error: str) -> dict[tuple[str, int], float]:
-    chosen = runs[runs["choice"] == choice].dropna(subset=[error])
+    """Of all runs of a choice that measured this error; not finite where they diverged."""
+    chosen = runs[runs["choice"] == choice]
+    chosen = chosen[chosen[error].notna() | _diverged(chosen, error.partition("_")[0])]
     return dict(zip(chosen["pair"], chosen[error], strict=True))
 
 
@@ -184,7 +213,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     write(output / "differences.csv", found.to_csv(index=False, float_format="%.4g"))
     errors = () if found.empty else found["error"].unique()  # of uniform choice alone
     tables = [*(table(found, error) for error in errors), concentration(runs)]
-    text = "\n\n".join([metrics_counted(runs), *map(to_markdown, tables)]) + "\n"
+    told = [metrics_counted(runs), *diverged_runs(runs)]
+    text = "\n\n".join([*told, *map(to_markdown, tables)]) + "\n"
     write(output / "tables.md", text)
     print(text)
     return 0

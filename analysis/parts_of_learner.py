@@ -6,6 +6,7 @@ and the numbers of a folder's runs.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -65,15 +66,15 @@ def errors_of(runs: Sequence[Run]) -> pd.DataFrame:
 def errors_by_part(results: pd.DataFrame, whole: str) -> pd.DataFrame:
     """[parts, scenes and seeds] errors, the first row those of the whole method, named ''.
 
-    Geometric means on hard frames of the metrics that all runs have; NaN where a run is missing.
-    Parts are ordered by their effect over all scenes, those that lower the error most by being
-    there first.
+    Geometric means on hard frames of the metrics that all runs have; NaN where a run is missing,
+    Inf where it diverged. Parts are ordered by their effect over all scenes, those that lower the
+    error most by being there first.
 
     results: as from `errors_of`; scenes and seeds without the whole method, or without any part of
     it, are left out
     """
     prefix, _ = ABLATIONS[whole]
-    error = mean_of_shared(results[[f"hard_{metric}" for metric in METRICS]])
+    error = mean_of_shared(results[[f"hard_{metric}" for metric in METRICS]]).fillna(math.inf)
     methods = results["method"].replace(OTHER_NAMES)
     parts = methods.str.removeprefix(f"{prefix}/").mask(methods == whole, "")
     named = methods.eq(whole) | methods.str.startswith(f"{prefix}/")
@@ -96,15 +97,21 @@ def effect(errors: pd.DataFrame, part: str) -> Estimate | None:
     """Relative difference of a part to the whole method, the mean over scenes.
 
     errors: as from `errors_by_part`. A scene's value is the mean over its seeds, paired. None where
-    there is no run of the part.
+    there is no run of the part, a mean of NaN where a run diverged.
     """
-    return difference_over_scenes(errors.loc[""].to_dict(), errors.loc[part].dropna().to_dict())
+    return difference_over_scenes(*_whole_and_part(errors, part))
 
 
 def effect_on(scene: str, errors: pd.DataFrame, part: str) -> Estimate | None:
     """The same on one scene, the mean over its seeds."""
-    of_scene = errors[scene]
-    return paired_difference(of_scene.loc[""].to_dict(), of_scene.loc[part].dropna().to_dict())
+    return paired_difference(*_whole_and_part(errors[[scene]], part))
+
+
+def _whole_and_part(errors: pd.DataFrame, part: str) -> tuple[dict[Any, float], dict[Any, float]]:
+    """Errors of the runs that there are, NaN where one diverged."""
+    there = (errors.loc[name].dropna().replace(math.inf, math.nan) for name in ("", part))
+    whole, of_part = (runs.to_dict() for runs in there)
+    return whole, of_part
 
 
 def parts_table(results: pd.DataFrame) -> str:
@@ -120,13 +127,13 @@ def _table(errors: pd.DataFrame, whole: str) -> str:
     heads = [ABLATIONS[whole][1], *scenes, "all of them"]
     lines = [markdown_row(heads), markdown_row([":--", *["--:"] * (len(heads) - 1)])]
     for part in errors.index:
-        means = {scene: errors.loc[part, scene].mean() for scene in scenes}
+        means = {scene: _mean(errors.loc[part, scene]) for scene in scenes}
         if part == "":
-            cells = [f"**{mean:.4f}**" for mean in means.values()]
+            cells = [f"**{mean}**" for mean in means.values()]
             lines.append(markdown_row(["*nothing*", *cells, ""]))
             continue
         cells = [
-            f"{mean:.4f} ({format_percent(found, 0)})"
+            f"{mean} ({format_percent(found, 0)})"
             if (found := effect_on(scene, errors, part))
             else ""
             for scene, mean in means.items()
@@ -134,6 +141,12 @@ def _table(errors: pd.DataFrame, whole: str) -> str:
         overall = format_percent(effect(errors, part), 0)
         lines.append(markdown_row([title(part), *cells, overall]))
     return "\n".join(lines)
+
+
+def _mean(errors: pd.Series) -> str:
+    """Over the seeds of a scene; how many runs diverged instead, where any did."""
+    diverged = errors.eq(math.inf).sum()
+    return f"{diverged} of {errors.count()} diverged" if diverged else f"{errors.mean():.4f}"
 
 
 def title(part: str) -> str:

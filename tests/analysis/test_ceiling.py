@@ -150,6 +150,46 @@ def test_a_study_that_is_not_finished_is_read_as_far_as_it_is(tmp_path: Path) ->
     assert pd.isna(row["half_width"])
 
 
+def test_a_run_that_diverged_is_not_a_missing_one(tmp_path: Path) -> None:
+    study(tmp_path)
+    write(
+        tmp_path / "more",
+        "room,64,400,uniform,2,0.10,0.2,0.3,",
+        "room,64,400,oracle,2,,0.2,,",
+        "egg,64,400,uniform,1,0.10,0.2,0.3,0.1",
+        "egg,64,400,oracle,1,inf,0.2,inf,0.1",
+    )
+    found = differences(read_runs(tmp_path))
+    for scene, n in (("room", 3), ("egg", 2), (EVERYWHERE, 2)):
+        row = only(found, scene=scene, choice="oracle", error="hard_error")
+        assert (np.isfinite(row["difference"]), row["n"]) == (False, n)
+        row = only(found, scene=scene, choice="oracle", error="uniform_error")
+        assert (row["difference"], row["n"]) == (0, n)
+    assert only(found, scene="room", choice=NO_CHOICE, error="hard_error")["n"] == 2
+    rows = [[cell.text for cell in row] for row in concentration(read_runs(tmp_path)).rows]
+    assert rows[1] == ["room", "400", "64", "15.0 %", "2"]
+    assert main([str(tmp_path)]) == 0
+    text = (tmp_path / "tables.md").read_text()
+    assert "– (3) |" in text
+    assert (
+        "2 run(s) ended with errors that are not finite, and so do means with them: egg, 64 "
+        "patches, 400 steps, oracle, seed 1; room, 64 patches, 400 steps, oracle, seed 2."
+    ) in text
+
+
+def test_a_size_without_choices_yet_is_not_the_pool(tmp_path: Path) -> None:
+    """Two sizes of as many steps, interrupted after uniform choice of the second one."""
+    study(tmp_path)
+    rows = [f"room,128,{steps},uniform,0,0.07,0.1,0.3,0.2" for steps in (400, 1600)]
+    write(tmp_path / "then", *rows, "room,32,1600,uniform,0,0.2,0.2,0.3,0.2")
+    write(tmp_path / "again", "room,32,1600,oracle,0,0.1,0.2,0.3,0.2")
+    found = differences(read_runs(tmp_path))
+    everything = only(found, scene="room", choice=NO_CHOICE, error="hard_error")
+    assert (everything["steps"], everything["n"]) == (400, 2)
+    assert everything["difference"] == pytest.approx((-0.5 - 0.6) / 2)
+    assert only(found, scene="room", steps=1600, error="hard_error")["choice"] == "oracle"
+
+
 def test_tables_say_how_many_seeds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     study(tmp_path)
     assert main([str(tmp_path), "--output", str(tmp_path / "out")]) == 0

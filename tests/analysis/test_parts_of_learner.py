@@ -70,9 +70,35 @@ def test_a_run_that_diverged_takes_no_metric_from_the_others() -> None:
     results = ablation()
     results.loc[3, [f"hard_{metric}" for metric in METRICS]] = [np.inf, np.nan, np.inf, np.nan]
     errors = errors_by_part(results, "ours")
-    assert np.isnan(errors.loc["big_steps", ("box", 0)])
+    assert np.isinf(errors.loc["big_steps", ("box", 0)])
     errors.loc["big_steps", ("box", 0)] = 0.12
-    pd.testing.assert_frame_equal(errors, errors_by_part(ablation(), "ours"))
+    expected = errors_by_part(ablation(), "ours")
+    pd.testing.assert_frame_equal(errors, expected, check_like=True)
+
+
+def diverged(row: int) -> pd.DataFrame:
+    results = ablation()
+    results.loc[row, [f"hard_{metric}" for metric in METRICS]] = np.nan
+    return results
+
+
+def test_a_run_that_diverged_is_not_a_missing_one() -> None:
+    """The mean of the other seeds would look like the mean of all."""
+    assert parts_table(diverged(3)).splitlines()[2:6] == [
+        "| *nothing* | **0.1500** | **0.2000** |  |",
+        "| small steps | 0.1100 (+10 %) | 0.3000 (+50 %) | +30 ± 254 % |",
+        "| sobol sequence |  | 0.1800 (-10 %) | -10 % |",
+        "| big steps | 1 of 2 diverged (–) |  | – |",
+    ]
+
+
+def test_a_whole_method_that_diverged_takes_no_seed_away() -> None:
+    assert parts_table(diverged(0)).splitlines()[2:6] == [
+        "| *nothing* | **1 of 2 diverged** | **0.2000** |  |",
+        "| sobol sequence |  | 0.1800 (-10 %) | -10 % |",
+        "| big steps | 0.2000 (–) |  | – |",
+        "| small steps | 0.1100 (–) | 0.3000 (+50 %) | – |",
+    ]
 
 
 def test_effects_are_paired_by_scene_and_seed() -> None:
