@@ -3,23 +3,29 @@
 `python -m analysis.examples.time_to_error FOLDER METHOD BASELINE` prints, scene by scene, the
 errors at the end, and the part of the baseline's run time after which the method's error on the
 hard frames (geometric mean of the metrics) stays below that with which the baseline ends, means
-over the seeds that both have. Cells begin with `# %%`, see `questions.py`.
+over the seeds that both have; without a part where a run diverged, and of what is not trained.
+Cells begin with `# %%`, see `questions.py`.
 """
 
 # %%
 import sys
-from pathlib import Path
 
 import numpy as np
 from tabulate import tabulate
 
+from analysis import load_runs
 from analysis.pairs import pair_runs
-from analysis.runs import METRICS, find_runs
+from analysis.runs import METRICS, check_comparable
 from analysis.speedup import log_error_series, time_to_stay_below
 from analysis.statistics import estimate
+from analysis.tables import MISSING
 
 folder, method, baseline = sys.argv[1:4]
-runs = find_runs(Path(folder))[0]
+results = load_runs(folder)
+for warning in results.warnings:
+    print(f"warning: {warning}", file=sys.stderr)
+runs = results.found
+check_comparable(runs)
 
 
 # %% Means and 95 % intervals over seeds
@@ -45,7 +51,8 @@ for scene in sorted({run.scene for run in runs}):
             differences.append(np.nan)
             continue
         seconds, bound = time_to_stay_below(curve, end[-1, 1])
-        parts.append((seconds / end[-1, 0], bound))
+        length = end[-1, 0]
+        parts.append((seconds / length, bound) if length > 0 else (np.nan, False))
         differences.append(100 * (np.exp(curve[-1, 1] - end[-1, 1]) - 1))
     at_most = "at most " if any(bound for _, bound in parts) else ""
     of = {who: [pair[who] for pair in both] for who in (0, 1)}
@@ -56,8 +63,11 @@ for scene in sorted({run.scene for run in runs}):
         )
         for who in (0, 1)
     ]
-    time = f"{at_most}{np.mean([p for p, _ in parts]):.3f}"
-    rows.append([scene, len(both), *finals, f"{interval(differences)} %", time])
+    part = np.mean([p for p, _ in parts])
+    time = MISSING if np.isnan(part) else f"{at_most}{part:.3f}"
+    lost = sum(ours.diverged("hard") or theirs.diverged("hard") for ours, theirs in both)
+    seeds = f"{len(both)} ({lost} diverged)" if lost else len(both)
+    rows.append([scene, seeds, *finals, f"{interval(differences)} %", time])
 print(f"Hard frames, {' / '.join(METRICS)}; error: {method} against {baseline} at the end;")
 print(f"time: part of its run time after which {method} stays below {baseline}'s final error")
 print(
