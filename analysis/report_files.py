@@ -70,7 +70,7 @@ def write_report(folder: Path, output: Path, *, baseline: str | None = None) -> 
     summaries, styles = summarise(runs), method_styles(runs)
     comparisons, claims = compare(summaries, baseline=base), judge(runs)
     doubts = _doubts(runs, claims)
-    notes = _notes(runs, claims)
+    notes = _notes(runs, claims, comparisons)
     films, unreadable = film_tables(folder, runs)
     found, frames = claims_table(claims), frame_table(runs)
     tables = [found, error_table(summaries), worst_table(summaries), cost_table(summaries)]
@@ -164,7 +164,9 @@ def _text(
     return "\n\n".join([*map(to_terminal, tables), "\n".join(notes)])
 
 
-def _notes(runs: Sequence[Run], claims: Sequence[ClaimResult]) -> list[str]:
+def _notes(
+    runs: Sequence[Run], claims: Sequence[ClaimResult], comparisons: Sequence[Comparison]
+) -> list[str]:
     """How to read the tables, and how the methods differ."""
     protocol = runs[0].result["protocol"]
     notes = [
@@ -175,6 +177,12 @@ def _notes(runs: Sequence[Run], claims: Sequence[ClaimResult]) -> list[str]:
         f"{REFERENCE_NOISE}: what a perfect prediction would score against these references; for "
         "DSSIM and LPIPS a lower bound of the right order of magnitude.",
     ]
+    if comparisons:
+        notes.append(
+            "Relative difference, paired by seed: the arithmetic mean over the seeds. Claims have "
+            "the geometric mean of the ratios, which is lower the more these scatter: of ratios of "
+            "0.4, 0.9 and 1.8 the arithmetic mean is +3.3 %, their geometric mean -13.5 %."
+        )
     if judged := sum(claim.verdict is not Verdict.NOT_RUN for claim in claims):
         notes.append(
             f"Claims judged: {judged}. Only a claim's primary test, named beforehand, can refute "

@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 from PIL import Image
+from scipy import stats
 
 from analysis import plots
 from analysis.curves import error_curve
@@ -171,6 +172,20 @@ def test_scenes_may_take_different_times(one_scene, make_run, capsys) -> None:
 def test_floors_that_are_lower_bounds_are_called_so(one_scene, capsys) -> None:
     assert main([str(one_scene)]) == 0
     assert "for DSSIM and LPIPS a lower bound" in capsys.readouterr().out
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_the_two_means_of_differences_are_told_apart(one_scene, tmp_path, capsys) -> None:
+    ratios = [0.4, 0.9, 1.8]
+    means = [100 * mean(ratios) - 100 for mean in (np.mean, stats.gmean)]
+    shown = "arithmetic mean is {:+.1f} %, their geometric mean {:+.1f} %".format(*means)
+    assert main([str(one_scene)]) == 0
+    for text in (capsys.readouterr().out, (one_scene / "report" / "results.md").read_text()):
+        assert shown in text
+    (alone := tmp_path / "alone").mkdir()
+    (one_scene / "mirror" / "uniform").rename(alone / "uniform")
+    assert main([str(alone)]) == 0
+    assert "geometric" not in capsys.readouterr().out
 
 
 @pytest.mark.usefixtures("undrawn")
