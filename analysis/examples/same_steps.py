@@ -48,7 +48,7 @@ def differences(run: Run, baseline: Run) -> tuple[float, float, float] | None:
 # %% Differences in per cent, with 95 % intervals over the seeds that all scenes have, and scenes
 print("Error on hard frames against uniform sampling, geometric mean of the metrics:")
 for method in methods:
-    alike = runs_of_one_budget(runs, [(scene, (method, "uniform")) for scene in scenes])
+    alike = runs_of_one_budget(runs, [((scene,), (method, "uniform")) for scene in scenes])
     pairs = [pair for scene in scenes for pair in pair_runs(alike, scene, method, "uniform")]
     found = {
         (pair.better.scene, pair.better.seed): values
