@@ -112,7 +112,7 @@ def test_denoised_frames_are_timed_with_the_buffers_that_guide_them_and_fill_the
         monkeypatch.setattr(AnalyticRenderer, name, slow)
     monkeypatch.setattr("ngi.methods.path_tracing.run.show", taking(show, 16.0))
     keep = taking(lambda radiance, *_: radiance, 4.0)
-    monkeypatch.setattr("ngi.denoise.OpenImageDenoise", lambda: keep)
+    monkeypatch.setattr("ngi.denoise.OpenImageDenoise", lambda **_: keep)
     time = f"path_tracing.milliseconds={milliseconds}"
     frame = run(tmp_path, "run", "method=path_tracing_oidn", time)["frame"]
     assert frame["samples_per_pixel"] == samples
