@@ -137,6 +137,11 @@ def in_plain_words(error: Exception) -> str:
     if found := re.search(r"__init__\(\) got an unexpected keyword argument '(\w+)'", str(cause)):
         unknown = f"{key}.{found[1]}"
         return f"{unknown}: this {key} has no such setting; leave it out: ~{unknown}"
+    if absent := re.search(r"__init__\(\) missing \d+ required .*?: (.+)", str(cause)):
+        return (
+            f"{key}: missing {absent[1]}; a setting is given as {key}.NAME=…, what the program "
+            f"gives needs `_partial_: true` beside {key}._target_"
+        )
     return str(cause) if key in str(cause) else f"{key}: {cause}"
 
 

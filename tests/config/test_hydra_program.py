@@ -126,6 +126,11 @@ def test_a_mistyped_key_is_said_in_one_line_and_leaves_nothing(module: str, tmp_
             ("+renderer.direct=traced",),
             "renderer.direct: this renderer has no such setting; leave it out: ~renderer.direct",
         ),
+        (
+            ("model._partial_=false",),
+            "model: missing 'layout' and 'scene_dimensions'; a setting is given as model.NAME=…, "
+            "what the program gives needs `_partial_: true` beside model._target_",
+        ),
     ],
 )
 def test_an_error_of_a_run_is_said_once_and_kept_where_the_run_is(
