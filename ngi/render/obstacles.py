@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 from ngi.machine.backend import mi
 from ngi.render.materials import collect_materials
 from ngi.render.projection import require_perspective
@@ -15,13 +18,13 @@ def obstacles(scene: mi.Scene, *, document: SceneFile) -> list[str]:
     def camera() -> None:
         require_perspective(scene, document=document)
 
-    def materials() -> None:
-        collect_materials([shape.bsdf() for shape in scene.shapes() if has_surface(shape)])
-
+    surfaces = [shape.bsdf() for shape in scene.shapes() if has_surface(shape)]
+    checks: list[Callable[[], object]] = [camera]
+    checks += [partial(collect_materials, [bsdf]) for bsdf in surfaces]
     found = []
-    for check in (camera, materials):
+    for check in checks:
         try:
             check()
         except ValueError as error:
             found.append(str(error))
-    return found
+    return list(dict.fromkeys(found))  # shapes share materials

@@ -29,6 +29,9 @@ _NOISE = _no("it changes how noisy a rendering is, not the picture")
 _COMPILED = _no(
     "Mitsuba compiles it into its kernels, so each value would take longer than a patch"
 )
+_UV = _no(
+    "Mitsuba compiles it into its kernels; let 'texture' choose between images that are shifted"
+)
 _SMOOTH = _no(
     "Mitsuba compiles the eta of a smooth BSDF into its kernels; take a thindielectric or "
     "roughdielectric, or let 'material' choose between BSDFs"
@@ -153,7 +156,7 @@ _SHAPES: dict[str, Parameters] = {
 }
 
 _TEXTURES: dict[str, Parameters] = {
-    "bitmap": {"data": _by("texture", "texels"), "to_uv": _COMPILED},
+    "bitmap": {"data": _by("texture", "texels"), "to_uv": _UV},
     "checkerboard": {"color0": _by("color0"), "color1": _by("color1"), "to_uv": _COMPILED},
     "mesh_attribute": {"scale": _COMPILED},
     "volume": {"volume": _COLOURED},
@@ -188,12 +191,13 @@ REFUSED: dict[Offer, str] = {
 _OTHER_NAMES = {
     "aperture_radius": _LENS,
     "focus_distance": _LENS,
+    "texture_offset": _UV,
     "weight": _UNKNOWN,
     "opacity": _UNKNOWN,
     "sigma_t": _MEDIUM,
     "g": _MEDIUM,
 }
-"""Parameters of refused plugins that users ask for."""
+"""Parameters of refused plugins, and what users call others."""
 
 
 def advice(name: str) -> str:

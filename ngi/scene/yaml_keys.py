@@ -104,7 +104,11 @@ class YamlKeys:
 
     def frames(self, key: str, *, dimensions: int) -> tuple[Vector, ...]:
         """A list of at least one scene vector."""
-        vectors = self.vectors(key, length=dimensions)
+        try:
+            vectors = self.vectors(key, length=dimensions)
+        except ValueError as error:
+            views = "; for views of the camera there is the property camera_path"
+            raise ValueError(f"{error}, a component of v each{views}") from error
         for i, vector in enumerate(vectors):
             if not all(0 <= number <= 1 for number in vector):
                 advice = "every component of v lies between 0 and 1"

@@ -55,12 +55,14 @@ def describe_file(path: Path) -> str:
     """What could vary in a plain Mitsuba file; writes a scene.yaml beside it, if there is none."""
     document = read_scene_file(path)
     scene = load(document)
-    found, nameless = candidates(scene)
+    found, nameless = candidates(document, scene)
     properties: dict[str, list[str]] = {}
     for candidate in found:
         properties.setdefault(candidate.object, []).append(candidate.property)
     lines = [f"{path}: a plain Mitsuba scene. What can vary:"]
     lines += [f"  {name}: {', '.join(kinds)}" for name, kinds in properties.items()]
+    if others := [sensor.id() for sensor in scene.sensors()[1:]]:
+        lines.append(f"  not rendered: {', '.join(others)}; of several cameras the first one is")
     if nameless:
         lines.append(f"  and {nameless} more object(s) without an id: give them one to vary them")
     found_wrong = obstacles(scene, document=document)
