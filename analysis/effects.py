@@ -62,8 +62,11 @@ def compare_on_scene(
 ) -> ComparisonResult | None:
     """Everything about two methods on one scene; None where they share no seed."""
     pairs = pair_runs(runs, scene, better, worse)
-    if not pairs:
-        return None
+    return compare_pairs(pairs, scene, better, worse) if pairs else None
+
+
+def compare_pairs(pairs: Sequence[Pair], scene: str, better: str, worse: str) -> ComparisonResult:
+    """The same of pairs of runs of that scene, one at least."""
     both = [run for pair in pairs for run in (pair.better, pair.worse)]
     effects: dict[str, Effect] = {}
     for set_name in SETS:

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
+from analysis.effects import compare_pairs, pool
+from analysis.evidence import ComparisonResult
 from analysis.methods import name_methods
-from analysis.runs import FURTHER, METRICS, SETS, Run, find_runs
+from analysis.pairs import pair_by_seed
+from analysis.runs import FURTHER, METRICS, SETS, Run, check_comparable, find_runs
 from analysis.step_log import read_steps
 
 KEYS = ["scene", "method", "seed", "folder"]
@@ -90,13 +95,50 @@ class Results:
     def frames(self) -> pd.DataFrame:
         """A row per test frame and metric, at the end of the run.
 
-        Columns: set, frame (its index in the set, the same picture in all runs of a scene), metric,
-        value (NaN where it was not measured).
+        Columns: set, frame (its index in the set, the same picture in all runs of a scene), metric
+        ('mape', 'dssim', 'mae', 'lpips', and 'relmse' where it was measured), value (NaN where it
+        was not).
         """
         wide = self._tables([pd.DataFrame(run.result["frames"]) for run in self.found])
         wide = wide.rename(columns={"index": "frame"})
-        tidy = wide.melt([*KEYS, "set", "frame"], list(METRICS), "metric", "value")
+        metrics = [metric for metric in (*METRICS, *FURTHER) if metric in wide]
+        tidy = wide.melt([*KEYS, "set", "frame"], metrics, "metric", "value")
         return tidy.astype({"value": float})
+
+    def compared(self, method: str, baseline: str) -> pd.DataFrame:
+        """How much less error one method has than another, paired by seed and frame.
+
+        Computed as the paper's claims are judged: the geometric mean of error ratios, with a 95 %
+        interval that counts seeds and frames as drawn by chance, over all scenes with each scene
+        as one draw.
+
+        method, baseline: as the column `method` names them
+
+        Columns: scene ('all scenes' in the last rows, where there are several), set, metric
+        ('together': the geometric mean of the metrics that both have), statistic ('mean',
+        'worst5'), difference (per cent, negative where `method` has less error), low, high (NaN
+        for a single seed), seeds, frames (pairs per seed; 0 for 'worst5').
+
+        Raises ValueError for methods without a scene and seed in common, for a seed with several
+        runs, and for runs that a report would refuse to compare.
+        """
+        named = [run for run in self.found if run.method in (method, baseline)]
+        check_comparable(named)
+        results = []
+        for scene in sorted({run.scene for run in named}):
+            by_method = {
+                name: {r.seed: r for r in named if (r.scene, r.method) == (scene, name)}
+                for name in (method, baseline)
+            }
+            if pairs := pair_by_seed(by_method[method], by_method[baseline]):
+                results.append(compare_pairs(pairs, scene, method, baseline))
+        if not results:
+            there = ", ".join(sorted({run.method for run in self.found}))
+            raise ValueError(
+                f"'{method}' and '{baseline}' have no scene and seed in common; there are {there}"
+            )
+        together = [pool(results)] if len(results) > 1 else []
+        return pd.DataFrame([row for result in results + together for row in _effects(result)])
 
     @cached_property
     def steps(self) -> pd.DataFrame:
@@ -135,6 +177,25 @@ def load_runs(folder: Path | str) -> Results:
     found, warnings = find_runs(Path(folder))
     runs = name_methods(found)
     return Results(tuple(runs), (*warnings, *_repeated(runs)))
+
+
+def _effects(result: ComparisonResult) -> list[dict[str, Any]]:
+    """A row for each effect of a comparison, that of all metrics together first."""
+    effects = {("hard", "together", "mean"): result.decisive}
+    for key, effect in result.effects.items():
+        set_name, metric, *worst = key.split("_")
+        effects[set_name, metric, worst[0] if worst else "mean"] = effect
+    return [
+        {
+            **dict(zip(("scene", "set", "metric", "statistic"), (result.scene, *key), strict=True)),
+            "difference": effect.effect_percent,
+            "low": math.nan if effect.low is None else effect.low,
+            "high": math.nan if effect.high is None else effect.high,
+            "seeds": effect.seeds,
+            "frames": effect.frames,
+        }
+        for key, effect in effects.items()
+    ]
 
 
 def _key(run: Run) -> tuple[str, str, int, str]:

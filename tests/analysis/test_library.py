@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from scipy.stats import gmean
 
 from analysis import load_runs
 from analysis.runs import FURTHER
@@ -241,3 +242,36 @@ def test_the_steps_that_a_method_had_no_time_for(make_method, tmp_path) -> None:
     assert [line.split()[4] for line in both] == ["+10.0", "+10.0"]
     assert faster == "no_preconditioning: 2 runs, 2.000 of the steps"
     assert as_many.split()[4] == "+0.0"
+
+
+def test_two_methods_are_compared_pair_by_pair(folder) -> None:
+    results = load_runs(folder)
+    table = results.compared("active_exploration", "uniform")
+    assert set(table["scene"]) == {"mirror"}  # chess has no run of the other
+    values = results.frames.query("scene == 'mirror' and set == 'hard'")
+    values = values.pivot_table("value", ["metric", "frame", "seed"], "method")
+    ratios = values["active_exploration"] / values["uniform"]
+    for metric, of_it in (("together", ratios), ("mape", ratios["mape"])):
+        row = table.query(f"set == 'hard' and metric == '{metric}' and statistic == 'mean'")
+        assert row["difference"].item() == pytest.approx(100 * (gmean(of_it) - 1))
+        assert row["low"].item() <= row["difference"].item() <= row["high"].item()
+        assert (row["seeds"].item(), row["frames"].item()) == (2, len(ratios["mape"]) / 2)
+    assert set(table.query("metric == 'mape'")["statistic"]) == {"mean", "worst5"}
+
+
+def test_a_comparison_over_scenes_counts_each_scene_once(folder, make_run) -> None:
+    make_run(scene="chess", method="active_exploration", quality=2.0)
+    table = load_runs(folder).compared("active_exploration", "uniform")
+    table = table.query("set == 'hard' and metric == 'mape' and statistic == 'mean'")
+    of_scenes = table.set_index("scene")["difference"]
+    assert list(of_scenes.index) == ["chess", "mirror", "all scenes"]
+    each = 1 + of_scenes[["chess", "mirror"]] / 100
+    assert of_scenes["all scenes"] == pytest.approx(100 * (gmean(each) - 1))
+
+
+def test_methods_that_cannot_be_compared_are_refused(folder, make_run) -> None:
+    with pytest.raises(ValueError, match="no scene and seed in common; there are active_expl"):
+        load_runs(folder).compared("active_exploration", "unifrom")
+    make_run(seed=1, method="uniform", name="again")
+    with pytest.raises(ValueError, match=r"the same method \(uniform\) with the same seed \(1\)"):
+        load_runs(folder).compared("active_exploration", "uniform")
