@@ -27,7 +27,7 @@ COMPARED = {
 
 
 def write_dimensions_figures(runs: Sequence[Run], folder: Path) -> list[Path]:
-    """Writes `dimensions.png`, `ours_dimensions.png` and `.svg` of the claims that have runs."""
+    """Writes `dimensions` and `ours_dimensions`, .png, .svg, .pdf, of the claims that have runs."""
     files = []
     for claim in claims_with_salons(runs):
         exploration, uniform = map(title, COMPARED[claim])

@@ -48,12 +48,15 @@ STYLE: dict[Any, Any] = {
     "grid.linewidth": 0.6,
     "axes.axisbelow": True,
     "svg.fonttype": "none",
+    "pdf.fonttype": 42,  # text stays text; publishers refuse Type 3
     "svg.hashsalt": "analysis",
 }
 """Settings of matplotlib for every figure of a report."""
 
-_DATES = {"png": "Creation Time", "svg": "Date"}
-"""Metadata that would make a file differ from one report to the next."""
+_DATES = {"png": "Creation Time", "svg": "Date", "pdf": "CreationDate"}
+"""Formats of a figure, for pages and for LaTeX, each with the metadata that would make its file
+differ from one report to the next.
+"""
 
 
 def method_styles(runs: Sequence[Run]) -> dict[str, dict[str, Any]]:
@@ -75,14 +78,14 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def figure_bytes(figure: Figure, suffix: str) -> bytes:
-    """The figure as a `png` or `svg` file without its date: the same runs give the same bytes."""
+    """The figure as one of `_DATES` without its date: the same runs give the same bytes."""
     stream = BytesIO()
     figure.savefig(stream, format=suffix, dpi=160, metadata={_DATES[suffix]: None})
     return stream.getvalue()
 
 
 def save_figure(figure: Figure, folder: Path, name: str) -> list[Path]:
-    """Writes `<name>.png` and `<name>.svg` into `folder`, arranged alike; returns their paths."""
+    """Writes `<name>.png`, `.svg` and `.pdf` into `folder`, arranged alike; returns their paths."""
     paths = [folder / f"{name}.{suffix}" for suffix in _DATES]
     for path in paths:
         write(path, figure_bytes(figure, path.suffix[1:]))

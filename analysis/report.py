@@ -19,8 +19,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="ngi report",
         description="Compares every finished run below FOLDER: results.csv, .md and .tex (mean and "
-        "95 % interval over seeds), error against run time (.png, .svg), comparison pictures of "
-        "the hard frames, and index.html, which combines all this with verdicts on the paper's "
+        "95 % interval over seeds), error against run time (.png, .svg, .pdf), comparison pictures "
+        "of the hard frames, and index.html, which combines all this with verdicts on the paper's "
         "claims and the provenance of the runs. Refuses to compare runs with different protocols, "
         "scene files or references.",
     )

@@ -50,7 +50,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         prog="python -m analysis.exploration_map",
         description="Draws the map of when exploration pays from the runs that "
         "`python -m ngi.studies.exploration_map` left in FOLDER: heat maps, a panel per knob, "
-        "error curves (.png, .svg), and every ratio of run times (.csv, .md, .tex).",
+        "error curves (.png, .svg, .pdf), and every ratio of run times (.csv, .md, .tex).",
     )
     parser.add_argument("folder", metavar="FOLDER", type=Path)
     parser.add_argument(

@@ -121,8 +121,8 @@ def _samples(data: Mapping[str, Any], renderer: Renderer) -> dict[str, Any]:
     # Else nothing, so that what is measured already stays what it is called.
     if renderer.halves:
         samples["halves"] = True
-    if not (target := data["_target_"]).startswith("ngi."):  # a class of one's own
-        samples["samples"] = target
+    if not _shipped(data):
+        samples["samples"] = data["_target_"]
     return samples
 
 
@@ -133,10 +133,19 @@ def _costing_the_same(model: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _proposing(sampler: Mapping[str, Any]) -> dict[str, Any]:
-    """Of chains the kind of proposal, of a sampler without chains all it is made of."""
-    if "proposal" in sampler:
-        return {"proposal": sampler["proposal"]["_target_"]}
+    """Of chains the kind of proposal, of a sampler without chains all it is made of. Classes of
+    one's own count with all their settings, and so does one that accepts.
+    """
+    if "proposal" in sampler and _shipped(sampler):
+        parts = {name: sampler[name] for name in ("proposal", "acceptance") if name in sampler}
+        own = {name: part for name, part in parts.items() if not _shipped(part)}
+        return {"proposal": sampler["proposal"]["_target_"]} | own
     return {"sampler": _without(sampler, "chains")}
+
+
+def _shipped(part: Mapping[str, Any]) -> bool:
+    """Whether its class is one of this program's, and not of one's own."""
+    return str(part["_target_"]).startswith("ngi.")
 
 
 def _inputs(settings: Mapping[str, Any], renderer: Renderer) -> dict[str, int]:

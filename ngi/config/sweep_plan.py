@@ -33,6 +33,7 @@ from ngi.files.run_folder import (
     RESULT,
     SETTINGS,
     STEPS,
+    differences,
     has_something,
     kept_settings,
     longer,
@@ -168,7 +169,10 @@ def _is_longer(config: DictConfig, there: Any, folder: Path) -> bool:
     ours = run_settings(config, **known)
     is_longer = longer(ours, than=there)
     if ours != there and not is_longer:
-        raise ValueError("its folder holds another run; choose one with run.folder=…, or delete it")
+        what = "; ".join(differences(there, ours)[:3])
+        raise ValueError(
+            f"its folder holds another run ({what}); choose one with run.folder=…, or move it away"
+        )
     return is_longer
 
 

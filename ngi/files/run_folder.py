@@ -176,18 +176,12 @@ class RunFolder:
             self.lengthened = True
             self.settings = _with_limits_of(self.settings, earlier)
             return
-        there, now = _flatten(earlier), _flatten(self.settings)
-        different = [
-            f"{key}: {there.get(key, 'absent')!r} there, {now.get(key, 'absent')!r} now"
-            for key in sorted(there.keys() | now.keys())
-            if there.get(key) != now.get(key)
-        ]
-        if different:
+        if different := differences(earlier, self.settings):
             self._lock.close()
             raise ValueError(
                 f"{self.path} holds another run ({'; '.join(different[:3])}"
                 f"{'; …' if len(different) > 3 else ''}); choose another folder with run.folder=…, "
-                "or delete that run"
+                "or move that run away"
             )
         self.settings = earlier
 
@@ -215,6 +209,16 @@ def longer(settings: dict[str, Any], *, than: dict[str, Any]) -> bool:
     if now != earlier or "path_tracing" in now or limits == former:
         return False
     return all(limit >= old for limit, old in zip(limits, former, strict=True))
+
+
+def differences(there: Any, now: Any) -> list[str]:
+    """Of the settings in a folder and those of a run: each that differs, with both values."""
+    before, after = _flatten(there), _flatten(now)
+    return [
+        f"{key}: {before.get(key, 'absent')!r} there, {after.get(key, 'absent')!r} now"
+        for key in sorted(before.keys() | after.keys())
+        if before.get(key) != after.get(key)
+    ]
 
 
 def _without_limits(settings: dict[str, Any]) -> tuple[dict[str, Any], list[float]]:

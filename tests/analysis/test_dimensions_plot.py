@@ -16,7 +16,9 @@ def test_each_learner_has_a_figure_of_its_own(make_method, tmp_path) -> None:
     assert write_dimensions_figures(find_runs(tmp_path)[0], tmp_path) == []
     make_method("ours_exploring", scene="salon-5")
     files = write_dimensions_figures(find_runs(tmp_path)[0], tmp_path)
-    assert [file.name for file in files] == ["ours_dimensions.png", "ours_dimensions.svg"]
+    assert [file.name for file in files] == [
+        f"ours_dimensions.{suffix}" for suffix in ("png", "svg", "pdf")
+    ]
     assert (
         "error of ours with uniform sampling minus error of ours exploring" in files[1].read_text()
     )

@@ -83,6 +83,9 @@ def test_what_one_run_does_not_tell_is_not_the_others_mean(runs: list[Run]) -> N
     assert row[table.columns.index(COLUMNS["median_lifetime"])] == "–"
 
 
+FORMATS = ("png", "svg", "pdf")
+
+
 def test_figures_of_scenes_with_a_trace_are_written(runs: list[Run], tmp_path: Path) -> None:
     written = write_exploration_figures(runs, method_styles(runs), tmp_path)
     names = (
@@ -91,7 +94,7 @@ def test_figures_of_scenes_with_a_trace_are_written(runs: list[Run], tmp_path: P
         "histogram_patch_mirror",
         "distance_mirror",
     )
-    assert [path.name for path in written] == [f"{n}.{s}" for n in names for s in ("png", "svg")]
+    assert [path.name for path in written] == [f"{n}.{s}" for n in names for s in FORMATS]
     for path in written:
         if path.suffix == ".png":
             with Image.open(path) as image:
@@ -111,7 +114,7 @@ def test_maps_that_are_no_density_leave_the_figures_of_the_others(
         if steps:
             write_maps(run.folder, 1 + np.arange(64.0).reshape(8, 8), steps)
         write_maps(run.folder, np.zeros((8, 8)), [COUNT])
-    assert len(write_exploration_figures(runs, method_styles(runs), tmp_path)) == 8
+    assert len(write_exploration_figures(runs, method_styles(runs), tmp_path)) == 4 * len(FORMATS)
 
 
 def test_runs_without_a_trace_leave_nothing_to_show(runs: list[Run], tmp_path: Path) -> None:

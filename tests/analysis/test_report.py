@@ -24,6 +24,10 @@ from analysis.tables import TITLES
 REPOSITORY = Path(__file__).resolve().parents[2]
 
 
+FORMATS = ("png", "svg", "pdf")
+"""Of every figure."""
+
+
 @pytest.fixture(autouse=True)
 def quick_page(monkeypatch) -> None:
     """The page has tests of its own (test_page.py); its figures take a second per scene."""
@@ -58,7 +62,7 @@ def test_report_writes_everything_it_names(two_scenes, capsys) -> None:
     named = [Path(line.strip()) for line in output.out.split("Written:")[1].splitlines() if line]
     expected = {"results.csv", "results.md", "results.tex", "mirror.png", "sphere-caustic.png"}
     expected |= {"index.html", "provenance.csv"}
-    expected |= {f"error_{s}.{x}" for s in ("mirror", "sphere-caustic") for x in ("png", "svg")}
+    expected |= {f"error_{s}.{x}" for s in ("mirror", "sphere-caustic") for x in FORMATS}
     assert {file.name for file in named if file.is_file()} == expected
     assert all(file.exists() for file in named)
     assert max(map(len, output.out.split("Protocol")[0].splitlines())) <= 120
@@ -236,9 +240,15 @@ def test_a_figure_s_files_are_arranged_alike(tmp_path, monkeypatch) -> None:
         return data
 
     monkeypatch.setattr(plots, "figure_bytes", noted)
-    written = plots.save_figure(figure, tmp_path, "two panels")
-    assert [file.name for file in written] == ["two panels.png", "two panels.svg"]
-    assert places[0] == places[1] != before
+    with matplotlib.rc_context(plots.STYLE):
+        written = plots.save_figure(figure, tmp_path, "two panels")
+    names = [f"two panels.{suffix}" for suffix in FORMATS]
+    assert [file.name for file in written] == names
+    assert places[0] == places[1] == places[2] != before
+    pdf = written[2].read_bytes()
+    assert pdf.startswith(b"%PDF")
+    assert b"CreationDate" not in pdf  # the same runs give the same bytes
+    assert b"/Type3" not in pdf
 
 
 def test_method_keeps_its_colour_in_every_scene(two_scenes) -> None:

@@ -13,6 +13,7 @@ from ngi.clock.costs import NOT_AVERAGED
 from ngi.clock.counters import Counters
 from ngi.clock.phase_clock import PAUSES, PHASES
 from ngi.config.build import run_components
+from ngi.explore import Greedy, NormalPerturbation
 from ngi.learn import Component, CostFile, ModelClock
 from ngi.machine.backend import VARIANTS
 from ngi.patches import MovingPoints
@@ -120,6 +121,28 @@ def test_methods_share_what_they_have_in_common() -> None:
 def test_a_cost_is_known_by_what_it_depends_on(override: str, changed: set[str]) -> None:
     before, after = keys(), keys(override)
     assert {name for name in before if before[name] != after[name]} == changed
+
+
+def test_what_a_proposal_of_one_s_own_costs_is_known_by_all_its_settings() -> None:
+    """What it does with them nobody here knows; of ours, none takes longer by its settings."""
+    step = "sampler.proposal.standard_deviation"
+    assert keys(f"{step}=0.1") == keys(f"{step}=0.2")
+    own = "sampler.proposal._target_=tests.clock.test_costs.Mine"
+    few, many = keys(own, f"{step}=0.1"), keys(own, f"{step}=0.2")
+    assert {name for name in few if few[name] != many[name]} == {"exploring"}
+    accepting = "sampler.acceptance._target_=tests.clock.test_costs.Accepting"
+    strict, equal = (
+        keys(accepting, f"sampler.acceptance.accept_equal={x}") for x in ("false", "true")
+    )
+    assert {name for name in strict if strict[name] != equal[name]} == {"exploring"}
+
+
+class Mine(NormalPerturbation):
+    """A proposal of one's own."""
+
+
+class Accepting(Greedy):
+    """So it is with what accepts."""
 
 
 def test_halves_have_costs_of_their_own_and_without_them_all_is_called_as_before() -> None:

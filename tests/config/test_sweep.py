@@ -129,7 +129,9 @@ def test_what_cannot_start_is_named_beforehand(finished: tuple[Path, str]) -> No
     words = ("seed=0", "optimizer.lr=1e-3", "model.hidden_features=16,32")
     status, output = sweep(place, *words, options=("-m", "--dry-run"))
     assert status == 1
-    assert "cannot start: its folder holds another run; choose one with run.folder=…" in output
+    differs = "model.hidden_features: 16 there, 32 now"
+    assert f"cannot start: its folder holds another run ({differs})" in output
+    assert "delete" not in output  # it may be finished
     assert "1 finished, 1 cannot start" in output
     assert contents(place) == before
 

@@ -283,4 +283,5 @@ def test_other_names_of_what_varies_are_told() -> None:
     assert (
         advice("reflectance.value") == "Mitsuba's 'reflectance' varies as albedo, texture, texels"
     )
+    assert advice("texture_offset").endswith("choose between images that are shifted")
     assert advice("nonsense") == ""
