@@ -53,7 +53,7 @@ STYLE: dict[Any, Any] = {
 }
 """Settings of matplotlib for every figure of a report."""
 
-_DATES = {"png": "Creation Time", "svg": "Date", "pdf": "CreationDate"}
+FORMATS = {"png": "Creation Time", "svg": "Date", "pdf": "CreationDate"}
 """Formats of a figure, for pages and for LaTeX, each with the metadata that would make its file
 differ from one report to the next.
 """
@@ -78,15 +78,15 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def figure_bytes(figure: Figure, suffix: str) -> bytes:
-    """The figure as one of `_DATES` without its date: the same runs give the same bytes."""
+    """The figure as one of `FORMATS` without its date: the same runs give the same bytes."""
     stream = BytesIO()
-    figure.savefig(stream, format=suffix, dpi=160, metadata={_DATES[suffix]: None})
+    figure.savefig(stream, format=suffix, dpi=160, metadata={FORMATS[suffix]: None})
     return stream.getvalue()
 
 
 def save_figure(figure: Figure, folder: Path, name: str) -> list[Path]:
     """Writes `<name>.png`, `.svg` and `.pdf` into `folder`, arranged alike; returns their paths."""
-    paths = [folder / f"{name}.{suffix}" for suffix in _DATES]
+    paths = [folder / f"{name}.{suffix}" for suffix in FORMATS]
     for path in paths:
         write(path, figure_bytes(figure, path.suffix[1:]))
         figure.set_layout_engine("none")  # it is arranged now, which takes as long as drawing it

@@ -105,7 +105,7 @@ def _word(text: str) -> str:
 def _entries(node: mi.Object, document: SceneFile, scene: mi.Scene) -> dict[str, str]:
     """Property -> the rest of its entry, with a range to start from."""
     if isinstance(node, mi.Sensor):
-        if node != scene.sensors()[0]:  # it is not rendered
+        if node != scene.sensors()[0] or node not in _cameras(scene):  # it is not rendered
             return {}
         return {"look_at": _views(node, scene), **_path(scene), **_field_of_view(node)}
     up = _up(scene)
@@ -220,14 +220,19 @@ def _views(sensor: mi.Sensor, scene: mi.Scene) -> str:
 
 def _path(scene: mi.Scene) -> dict[str, str]:
     """Through the views of all cameras, where there are several: only the first one is rendered."""
-    views = [_list(_view(sensor, scene)) for sensor in scene.sensors()]
+    views = [_list(_view(camera, scene)) for camera in _cameras(scene)]
     keys = f", keys: [{', '.join(views)}]{_up_option(_up(scene))}"
     return {"camera_path": keys} if len(views) > 1 else {}
 
 
-def _view(sensor: mi.Sensor, scene: mi.Scene) -> Values:
+def _cameras(scene: mi.Scene) -> list[mi.Sensor]:
+    """Sensors that stand somewhere; others measure what a shape receives."""
+    return [sensor for sensor in scene.sensors() if "to_world" in mi.traverse(sensor)]
+
+
+def _view(camera: mi.Sensor, scene: mi.Scene) -> Values:
     """[6]: origin and target, a third of the scene away."""
-    to_world, distance = _to_world(sensor), np.linalg.norm(np.subtract(*_bounds(scene))) / 3
+    to_world, distance = _to_world(camera), np.linalg.norm(np.subtract(*_bounds(scene))) / 3
     origin = to_world[:3, 3]
     return np.concatenate([origin, origin + distance * to_world[:3, 2]])
 
@@ -236,7 +241,9 @@ def _up(scene: mi.Scene) -> Values:
     """Of y and z the one with which a camera that looks where the first one does is as upright, and
     along which it does not look: of that nothing can be told.
     """
-    _, upwards, forward, _ = _to_world(scene.sensors()[0])[:3].T
+    if not (cameras := _cameras(scene)):
+        return Y
+    _, upwards, forward, _ = _to_world(cameras[0])[:3].T
 
     def agreement(up: Values) -> float:
         found = transforms.look_at(np.zeros(3), forward, up)[:3, 1] @ upwards

@@ -12,7 +12,7 @@ from analysis.exploration import (
 )
 from analysis.exploration_plots import PANELS, write_exploration_figures
 from analysis.methods import name_methods
-from analysis.plots import method_styles
+from analysis.plots import FORMATS, method_styles
 from analysis.runs import Run, find_runs
 from analysis.step_log import mean_over_time
 from analysis.target_map import histogram_distances
@@ -81,9 +81,6 @@ def test_what_one_run_does_not_tell_is_not_the_others_mean(runs: list[Run]) -> N
     row = [cell.text for cell in table.rows[1]]
     assert row[:3] == ["mirror", "mcmc_loss_step", "2"]
     assert row[table.columns.index(COLUMNS["median_lifetime"])] == "–"
-
-
-FORMATS = ("png", "svg", "pdf")
 
 
 def test_figures_of_scenes_with_a_trace_are_written(runs: list[Run], tmp_path: Path) -> None:

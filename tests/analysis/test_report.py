@@ -16,16 +16,12 @@ from scipy import stats
 from analysis import plots
 from analysis.curves import error_curve
 from analysis.methods import name_methods
-from analysis.plots import COLOURS, method_styles
+from analysis.plots import COLOURS, FORMATS, method_styles
 from analysis.report import main
 from analysis.runs import FURTHER, Run, find_runs
 from analysis.tables import TITLES
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-
-
-FORMATS = ("png", "svg", "pdf")
-"""Of every figure."""
 
 
 @pytest.fixture(autouse=True)

@@ -144,6 +144,11 @@ def test_of_several_cameras_there_is_a_path(
     assert "  not rendered: behind; of several" in capsys.readouterr().out
 
 
+def test_what_a_shape_receives_is_no_view(tmp_path: Path) -> None:
+    meter = '<shape type="rectangle"><sensor type="irradiancemeter" id="meter"/></shape>'
+    assert "camera_path, " not in started(room(tmp_path, more=meter))
+
+
 def test_every_material_that_cannot_be_trained_on_is_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
