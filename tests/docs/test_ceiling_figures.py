@@ -321,3 +321,32 @@ def test_what_could_be_gained_with_clean_patches_is_what_the_runs_say(
             changes = 100 * (errors.loc[run] / base).dropna() - 100
             numbers = [" / ".join(f"{each:+.1f}" for each in of_one) for of_one in changes.values]
             assert cell == "; ".join(numbers).replace("-", "−")
+
+
+def test_the_ceiling_of_an_hour_on_bathroom_is_what_its_runs_say() -> None:
+    folder = ROOT / "docs/exploration-ceiling"
+    runs = pd.read_csv(folder / "hour_ceiling_bathroom.csv").set_index(["patches", "choice"])
+    assert set(runs["scene"]) == {"bathroom"}
+    columns = ["hard_error", "hard_tail", "uniform_error", "uniform_tail"]
+    base = runs.loc[(2384, "uniform"), columns]
+    others = ((2384, "oracle"), (2384, "oracle_cubed"), (5120, "uniform"))
+    changes = [[tenths(x) for x in runs.loc[run, columns] / base - 1] for run in others]
+    page = "docs/exploration-ceiling/README.md"
+    second = 2 + 6 + 2  # after the table of the other two scenes, and two lines of its own
+    assert rows_of(page, "The end of an hour")[second : second + 3] == changes
+    ends = tuple(row[0].lstrip("−") for row in changes[:2])
+    words = r"it is ([\d.]+) % after an hour on one core, ([\d.]+) % for a sharper choice"
+    assert said(page, words) == ends
+    assert (
+        said(page, r"on bathroom\]\S+ ([\d.]+) % where in proportion it gains ([\d.]+)\.")
+        == ends[::-1]
+    )
+    pages = (
+        "docs/exploration-ceiling/small-patches.md",
+        r"and ([\d.]+) % off bathroom, ([\d.]+) if",
+    )
+    assert said(*pages) == ends
+    hours = pd.read_csv(folder / "hour_same_time.csv")
+    last = hours[hours.scene == "bathroom"].groupby("method").last()
+    assert abs(last.step["ours_uniform"] - 11968) <= 1
+    assert last.patches_traced["ours_small_patches"] == 4 * 2384
