@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -73,11 +73,13 @@ def write_report(folder: Path, output: Path, *, baseline: str | None = None) -> 
     notes = _notes(runs, claims, comparisons)
     films, unreadable = film_tables(folder, runs)
     found, frames = claims_table(claims), frame_table(runs)
-    tables = [found, error_table(summaries), worst_table(summaries), cost_table(summaries)]
-    tables += [comparison_table(comparisons), frames, *films]
+    wide = [found, error_table(summaries), worst_table(summaries), cost_table(summaries)]
+    wide += [comparison_table(comparisons), frames, *films]
+    narrow = [found, frames, *_by_set(summaries, comparisons), cost_table(summaries), *films]
     output.mkdir(parents=True, exist_ok=True)
     doubtful = [*notes, *(f"Warning: {doubt}" for doubt in doubts)]
-    files = _write_tables(tables, runs, summaries, doubtful, output)
+    files = _write_tables(summaries, runs, output)
+    files += _write_text(wide, narrow, doubtful, output)
     missing = []
     for scene in _progress(sorted({run.scene for run in runs}), "figures of scenes"):
         of_scene = [run for run in runs if run.scene == scene]
@@ -104,7 +106,7 @@ def write_report(folder: Path, output: Path, *, baseline: str | None = None) -> 
     )
     page = output / "index.html"
     write_page(contents, page, lambda parts: _progress(parts, "page"))
-    text = _text(summaries, comparisons, [found, frames], films, notes)
+    text = "\n\n".join([*map(to_terminal, _filled(narrow)), "\n".join(notes)])
     return Report(text, [page, *files, *exploration], warnings)
 
 
@@ -128,40 +130,35 @@ def _progress(parts: Iterable[Any], what: str) -> Iterable[Any]:
     return tqdm(parts, desc=what, leave=False, disable=None)
 
 
-def _write_tables(
-    tables: Sequence[Table],
-    runs: Sequence[Run],
-    summaries: Sequence[Summary],
-    notes: Sequence[str],
-    output: Path,
-) -> list[Path]:
-    csv, markdown, latex = (output / f"results.{suffix}" for suffix in ("csv", "md", "tex"))
-    provenance = output / "provenance.csv"
-    write(csv, to_frame(summaries).to_csv(index=False))
-    write(provenance, provenance_frame(runs).to_csv(index=False))
-    filled = [table for table in tables if table.rows]
-    lines = "\n".join(f"- {note}" for note in notes)
-    write(markdown, "\n\n".join([*map(to_markdown, filled), lines]) + "\n")
-    package = r"% for documents with \usepackage{booktabs}"
-    write(latex, "\n\n".join([package, *map(to_latex, filled)]) + "\n")
-    return [csv, markdown, latex, provenance]
-
-
-def _text(
-    summaries: Sequence[Summary],
-    comparisons: Sequence[Comparison],
-    others: Sequence[Table],
-    films: Sequence[Table],
-    notes: Sequence[str],
-) -> str:
-    """The same tables for the terminal, a set of frames at a time so that they fit its width."""
-    tables = [table for table in others if table.rows]
+def _by_set(summaries: Sequence[Summary], comparisons: Sequence[Comparison]) -> Iterator[Table]:
+    """A set of frames at a time, which fits a terminal and a page."""
     for name in SETS:
-        tables += [error_table(summaries, [name]), worst_table(summaries, [name])]
-        if comparisons:
-            tables.append(comparison_table(comparisons, [name]))
-    tables += [cost_table(summaries), *films]
-    return "\n\n".join([*map(to_terminal, tables), "\n".join(notes)])
+        yield error_table(summaries, [name])
+        yield worst_table(summaries, [name])
+        yield comparison_table(comparisons, [name])
+
+
+def _filled(tables: Iterable[Table]) -> list[Table]:
+    return [table for table in tables if table.rows]
+
+
+def _write_tables(summaries: Sequence[Summary], runs: Sequence[Run], output: Path) -> list[Path]:
+    results, provenance = output / "results.csv", output / "provenance.csv"
+    write(results, to_frame(summaries).to_csv(index=False))
+    write(provenance, provenance_frame(runs).to_csv(index=False))
+    return [results, provenance]
+
+
+def _write_text(
+    wide: Sequence[Table], narrow: Sequence[Table], notes: Sequence[str], output: Path
+) -> list[Path]:
+    """The wide tables and the notes as Markdown, the narrow ones as LaTeX."""
+    markdown, latex = output / "results.md", output / "results.tex"
+    lines = "\n".join(f"- {note}" for note in notes)
+    write(markdown, "\n\n".join([*map(to_markdown, _filled(wide)), lines]) + "\n")
+    package = r"% for documents with \usepackage{booktabs}"
+    write(latex, "\n\n".join([package, *map(to_latex, _filled(narrow))]) + "\n")
+    return [markdown, latex]
 
 
 def _notes(
@@ -171,7 +168,7 @@ def _notes(
     protocol = runs[0].result["protocol"]
     notes = [
         f"Protocol {protocol['name']} ({protocol['identity']}). Lower is better; a scene's "
-        "lowest mean is marked.",
+        "lowest mean is marked, however small its lead.",
         "±: half width of the 95 % interval of the mean over n seeds (Student's t); "
         "none for one seed.",
         f"{REFERENCE_NOISE}: what a perfect prediction would score against these references; for "

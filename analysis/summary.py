@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 
 from analysis.methods import BASELINE, baselines, methods_in_order
-from analysis.runs import DISTINCTIONS, METRICS, SETS, Run
+from analysis.runs import DISTINCTIONS, FURTHER, METRICS, SETS, Run
 from analysis.statistics import Estimate, estimate, paired_difference
 
 REFERENCE_NOISE = "reference noise"
@@ -25,7 +25,8 @@ observations of CNSR, and the network; runs of earlier versions do not know it."
 class Summary:
     """One row of the results: a scene, a method, and its values averaged over the seeds.
 
-    values: 'hard_mape', 'hard_mape_worst5', …, and the costs; None where runs have no such value.
+    values: 'hard_mape', 'hard_mape_worst5', …, 'hard_relmse', 'hard_tail', and the costs; None
+        where runs have no such value.
     The reference noise is a summary without runs that has the means' keys only.
     """
 
@@ -59,13 +60,13 @@ def summarise(runs: Sequence[Run]) -> list[Summary]:
 def _values(runs: Sequence[Run]) -> dict[str, Estimate | None]:
     values: dict[str, Estimate | None] = {}
     for set_name in SETS:
-        for metric in METRICS:
-            for statistic, suffix in (("mean", ""), ("worst5", "_worst5")):
-                found = [run.metric(set_name, metric, statistic) for run in runs]
-                numbers = [value for value in found if value is not None]
-                # Runs with and without LPIPS weights are not averaged as if n were the same.
-                complete = len(numbers) == len(runs)
-                values[f"{set_name}_{metric}{suffix}"] = estimate(numbers) if complete else None
+        means = [(metric, "mean", "") for metric in (*METRICS, *FURTHER)]
+        for metric, statistic, suffix in means + [(name, "worst5", "_worst5") for name in METRICS]:
+            found = [run.metric(set_name, metric, statistic) for run in runs]
+            numbers = [value for value in found if value is not None]
+            # Runs with and without LPIPS weights are not averaged as if n were the same.
+            complete = len(numbers) == len(runs)
+            values[f"{set_name}_{metric}{suffix}"] = estimate(numbers) if complete else None
     for cost in COSTS:
         values[cost] = estimate([float(run.result[cost]) for run in runs])
     seconds = [_frame_seconds(run.result) for run in runs if "frame_seconds" in run.result]

@@ -59,11 +59,11 @@ def error_table(summaries: Sequence[Summary], sets: Sequence[str] = SETS) -> Tab
 
 
 def worst_table(summaries: Sequence[Summary], sets: Sequence[str] = SETS) -> Table:
-    """The metrics' means over the worst 5 % of the frames."""
+    """The metrics' means over the worst 5 % of the frames, with intervals."""
     methods = [summary for summary in summaries if summary.is_method]
     keys = {f"{key}_worst5": column for key, column in _metric_columns(sets).items()}
     title = f"Error on {' and '.join(sets)} frames, mean of the worst 5 %"
-    return _table(title, methods, keys, lambda value: format_number(value.mean))
+    return _table(title, methods, keys, format_estimate)
 
 
 def cost_table(summaries: Sequence[Summary]) -> Table:

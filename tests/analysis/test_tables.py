@@ -154,11 +154,29 @@ def test_frame_holds_every_number(summaries, tmp_path) -> None:
     assert math.isnan(frame[frame.method == "reference noise"].iloc[0]["steps"])
 
 
+def test_frame_has_further_errors_where_runs_know_them(make_run, tmp_path) -> None:
+    def measured(result: dict) -> None:
+        result["relmse"] = {"hard": 0.01 * (1 + result["seed"]), "uniform": 0.5}
+        result["tail"] = {"hard": 0.25, "uniform": 0.125}
+
+    for seed in range(3):
+        make_run(seed=seed, change=measured)
+        make_run(seed=seed, sampler="older")
+    frame = to_frame(summarise(name_methods(find_runs(tmp_path)[0]))).set_index("method")
+    assert frame.loc["uniform", "hard_relmse"] == pytest.approx(0.02)
+    # Student's t of two degrees of freedom at 97.5 %, the standard deviation 0.01
+    half_width = 4.302653 * 0.01 / math.sqrt(3)
+    assert frame.loc["uniform", "hard_relmse_interval"] == pytest.approx(half_width)
+    assert frame.loc["uniform", "uniform_tail"] == 0.125
+    assert frame.loc["older", ["hard_relmse", "uniform_tail"]].isna().all()
+
+
 def test_the_best_mean_of_a_scene_is_marked(summaries) -> None:
     lines = to_terminal(error_table(summaries)).splitlines()
     marks = {line.split()[1]: line.count("*") for line in lines[3:]}
     assert marks == {"uniform": 0, "mcmc_loss_step": 8, "reference": 0}
     assert to_markdown(worst_table(summaries)).count("**") == 2 + 2 * 8
+    assert to_terminal(worst_table(summaries)).count(" ± ") == 2 * 8
     assert "*" not in to_terminal(cost_table(summaries))
 
 
@@ -238,6 +256,22 @@ def test_latex_has_no_sign_that_it_does_not_know() -> None:
     text = escape("≥9.2 ± 1 – ε ≤ 0.85 ×")
     assert text.isascii()
     assert text.startswith(r"$\ge$9.2")
+
+
+def test_latex_has_minus_signs_before_numbers_alone() -> None:
+    assert escape("-1.5 % (-2, 3) pre-trained 1e-3 a-1") == (
+        r"$-$1.5 \% ($-$2, 3) pre-trained 1e-3 a-1"
+    )
+
+
+def test_latex_breaks_long_text_into_lines() -> None:
+    long = "Active Exploration against uniform sampling, sphere-caustic"
+    rows = tuple((Cell("same_time"), Cell(text), Cell("1")) for text in (long, "short"))
+    text = to_latex(Table("Claims", ("claim", "compared", "seeds"), rows, 2))
+    assert r"\begin{tabular}{lp{9em}r}" in text
+    assert rf"same\_time & \raggedright {long} & 1 \\" in text
+    assert r"same\_time & short & 1 \\" in text
+    assert r"{lr}" in to_latex(Table("Claims", ("claim", "seeds"), (), 1))
 
 
 def test_latex_is_escaped() -> None:
