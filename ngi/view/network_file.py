@@ -29,6 +29,9 @@ ImageNetwork = PixelGenerator | EncodedGenerator
 TRACED_PIXELS = 16
 """In the example that the network is traced with; the file takes any number."""
 
+OPSET, FORMAT = 18, 8
+"""Of ONNX, from 2023: the oldest that PyTorch's exporter writes, for the sake of older runtimes."""
+
 
 class PixelRadiance(nn.Module):
     """A network for pixels in any order, all at one v, in linear radiance.
@@ -66,9 +69,11 @@ def network_file(network: ImageNetwork, metadata: Mapping[str, str]) -> bytes:
             input_names=["buffers", "v"],
             output_names=["radiance"],
             dynamic_shapes={"buffers": {0: "pixels"}, "v": None},
+            opset_version=OPSET,
         )
     assert program is not None
     model = program.model_proto
+    model.ir_version = FORMAT
     _forget_origins(model.graph)
     onnx.helper.set_model_props(model, dict(metadata))
     content: bytes = model.SerializeToString()

@@ -111,6 +111,14 @@ def test_a_program_without_this_one_gets_linear_radiance(
     assert name == "one" or (expected < 0).any()
 
 
+def test_the_file_is_one_that_runtimes_of_2023_read(exported: Path) -> None:
+    model = onnx.load(exported)
+    onnx.checker.check_model(model, full_check=True)
+    [operators] = model.opset_import
+    # In ONNX's table of versions these belong together, and to ONNX Runtime 1.14.
+    assert (operators.domain, operators.version, model.ir_version) == ("", 18, 8)
+
+
 def test_the_file_says_what_its_inputs_are(
     embedded: dict[str, Any], opened: TrainedRun, trained: Path
 ) -> None:
