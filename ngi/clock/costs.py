@@ -13,7 +13,8 @@ A component is known by the settings that it depends on and by nothing else, and
 (`ngi.studies.step_costs`). What two methods share has therefore the same cost in both, and noise
 of the measurement cannot decide between them. What is not told apart: where in the scene the chains
 are, the resolution that patches are cut from (64 to 600 pixels: within 4 % of 128 on two scenes),
-and how full the store is.
+and how full the store is. The seconds are medians: what fewer than half of the batches do, such as
+growing the forest of `PredictedLoss` anew, is not counted.
 """
 
 import fcntl
@@ -101,9 +102,10 @@ def components(
     }
     if patches_per_vector > 1:  # else nothing: what is measured already stays what it is called
         rendering["patches_per_vector"] = patches_per_vector
+    noise = {"loss": settings["loss"]} if renderer.halves else {}
     found = [
         Component("training", training),
-        Component("exploring", {**_proposing(sampler), **patches}),
+        Component("exploring", {**_proposing(sampler), **patches, **noise}),
         Component("rendering", rendering),
     ]
     if scored:

@@ -8,8 +8,8 @@ from ngi.clock.phase_clock import PAUSES, PHASES
 
 STEPS_OF: dict[str, Callable[[Counters], int]] = {
     "training": lambda counters: counters.iteration,
-    "exploring": lambda counters: counters.generated_batches,
-    "rendering": lambda counters: counters.generated_batches,
+    "exploring": lambda counters: counters.proposed_batches,
+    "rendering": lambda counters: counters.proposed_batches,
     "scoring": lambda counters: counters.scored_batches,
 }
 """How many steps had each component of `ngi.clock.costs`."""

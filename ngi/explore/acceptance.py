@@ -15,7 +15,7 @@ class Acceptance(Protocol):
     @property
     def needs_current(self) -> bool:
         """Whether it looks at the targets; if not, the current states need no scoring."""
-        ...
+        return True
 
     def __call__(
         self, target_proposed: Tensor, target_current: Tensor, generator: torch.Generator

@@ -130,5 +130,5 @@ def _large_steps(points: Tensor, like: Tensor) -> Proposals:
 
 
 def _single_precision(points: Tensor) -> Tensor:
-    """Float64 in [0, 1) rounded down, so that none becomes 1 or changes its cell."""
+    """Float64 in [0, 1) rounded down, so that none becomes 1, or changes its cell of 2^k."""
     return ((points * 2**24).floor() / 2**24).float()

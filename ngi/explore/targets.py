@@ -17,7 +17,7 @@ class Signals:
 
     loss: [n], the training loss of the sample
     output_gradient_norm: [n], L2 norm of the loss's derivative by the network's output, over the
-        pixels of the patch; it falls out of the training pass
+        pixels of the patch
     step_norm: [n], L2 norm over all weights of the optimiser's step this sample alone would cause,
         momentum and RMS included
     """

@@ -1,8 +1,9 @@
 """Asks the network for the target density of proposed and current chain states.
 
 Scoring has to cost next to nothing (a sampler that spends a third of its time on it loses to
-uniform sampling at equal time). The proposals are trained on anyway, so that their loss, their
-gradient at the output and the norm of their step are taken from the training pass itself.
+uniform sampling at equal time). The proposals are trained on anyway, so that their loss, the
+output that their gradient there follows from, and the norm of their step are taken from the
+training pass itself.
 Only the chains' current states go through the network for it, all in one pass.
 """
 
@@ -50,6 +51,7 @@ class Scorer:
                 f"sampler.target: {type(target).__name__} requires {sorted(unknown)}; known are "
                 f"{[field.name for field in fields(Signals)]}"
             )
+        self.requires = target.requires
         self._target = target
         self._network = network
         self._loss = loss

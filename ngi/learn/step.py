@@ -91,8 +91,7 @@ def training_step(
     step = Step()
     with learner.stream.clock.phase("train"):
         attempt, feedback = queue(optimizer)()  # the one time that the step waits for the device
-        learner.guard.admit(attempt)
-        _update(learner, optimizer)
+        _update(learner, optimizer, taken=learner.guard.admit(attempt))
     # The chains accept or refuse what they proposed; store and policy learn of the losses.
     learner.stream.feedback(feedback)
     step.tell(Outcome(attempt.loss, attempt.gradient_norm))
@@ -114,7 +113,7 @@ def _taken_unseen(
         if before.restorations > restorations:
             queued = queue(optimizer)  # the weights are others now
         before.keep()
-        _update(learner, optimizer)
+        _update(learner, optimizer, taken=True)
 
     def finish() -> None:
         with stream.clock.phase("train"):
@@ -124,8 +123,7 @@ def _taken_unseen(
             else:
                 with before.restored():
                     attempt, feedback = queue(before.optimizer)()
-                    learner.guard.admit(attempt)
-                    _update(learner, before.optimizer)
+                    _update(learner, before.optimizer, taken=learner.guard.admit(attempt))
         stream.learn(batch, feedback.losses)
         step.tell(Outcome(attempt.loss, attempt.gradient_norm))
 
@@ -170,9 +168,9 @@ def _passes(
     return known
 
 
-def _update(learner: Learner, optimizer: torch.optim.Optimizer) -> None:
-    optimizer.step()  # does nothing where the guard has taken the gradient back
-    if learner.averaged is not None:
+def _update(learner: Learner, optimizer: torch.optim.Optimizer, *, taken: bool) -> None:
+    optimizer.step()  # counts, but does nothing where the guard has taken the gradient back
+    if taken and learner.averaged is not None:
         learner.averaged.update_parameters(learner.network)
 
 
@@ -200,6 +198,12 @@ def _forward(
     """Loss per sample [n], and the scores of proposed and current states, where they are asked."""
     if batch.current is None:
         return learner.losses(batch.patches)[0], None
+    if batch.loss_weights is not None and "step_norm" in learner.scorer.requires:
+        raise ValueError(
+            "sampler.proposal: it weights the losses of what it proposes, and sampler.target reads "
+            "the norms of steps, which are then those of weighted losses for proposals alone; give "
+            "a target without them, such as ngi.explore.Loss, or weights of None"
+        )
     with learner.scorer.watch(batch.patches, batch.current, optimizer) as score:
         losses, prediction = learner.losses(batch.patches)
         return losses, score(prediction, losses)

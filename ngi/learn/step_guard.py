@@ -130,23 +130,26 @@ class StepGuard:
         """Whether the step is one to be taken, with its gradient as it is."""
         return attempt.usable and self._factor(attempt.gradient_norm) is None
 
-    def admit(self, attempt: Attempt) -> None:
+    def admit(self, attempt: Attempt) -> bool:
         """Between the backward pass and the optimiser's step, or later where it `admits` it.
+
+        Gives whether the step is taken, be it with a smaller gradient.
 
         Raises FloatingPointError for one refusal too many.
         """
         if not attempt.usable:
             self._refuse(attempt, _cause(attempt))
-            return
+            return False
         self._in_a_row = 0
         factor = self._factor(attempt.gradient_norm)
         self._follow(attempt.gradient_norm)
         if factor is None:
-            return
+            return True
         self._stream.counters.steps_scaled += 1
         for parameter in attempt.network.parameters():
             if parameter.grad is not None:
                 parameter.grad.mul_(factor)
+        return True
 
     def _factor(self, norm: float) -> float | None:
         """By which a gradient of this norm is scaled down to the average; None where it is not."""

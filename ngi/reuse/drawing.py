@@ -17,8 +17,8 @@ class DrawingRule(Protocol):
 
     @property
     def by_loss(self) -> bool:
-        """Whether it looks at the losses."""
-        ...
+        """Whether it looks at the losses; if not, a GPU need not wait for them."""
+        return True
 
     def draw(
         self, losses: Tensor, waiting: Tensor, count: int, generator: torch.Generator

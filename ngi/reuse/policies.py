@@ -37,7 +37,7 @@ class PolicyState:
 class ReusePolicy(Protocol):
     """Decides whether the next batch is a reused one."""
 
-    by_loss: bool = False  # whether it depends on the losses
+    by_loss: bool = True  # whether it depends on the losses; if not, a GPU need not wait for them
     stored_alone: float = 0.0  # the last share of a run's steps, in which no batch is new
 
     def init(self) -> PolicyState:
@@ -78,6 +78,8 @@ class ReusePolicy(Protocol):
 class Never(ReusePolicy):
     """Generates every batch: the paper's test of the samples' distribution (Sec. 5.1)."""
 
+    by_loss = False
+
     def probability(
         self, state: PolicyState, *, generated_batches: int, store_size: int, store_capacity: int
     ) -> float:
@@ -91,6 +93,8 @@ class UntilFull(ReusePolicy):
     before any training, that epoch would end after as many steps and as much run time; only the
     weights in between, which evaluations and checkpoints see, would still be untrained.
     """
+
+    by_loss = False
 
     def probability(
         self, state: PolicyState, *, generated_batches: int, store_size: int, store_capacity: int
@@ -112,6 +116,8 @@ class FixedProbability(ReusePolicy):
     stored_alone: share of a run's steps, the last ones, that are on stored patches alone
         (`ngi.learn.Progress`). A patch that comes late is hardly trained on
     """
+
+    by_loss = False
 
     def __init__(
         self, *, bootstrap_batches: int, probability: float, stored_alone: float = 0.0

@@ -88,6 +88,8 @@ def test_the_clock_counts_steps_times_costs() -> None:
     counters.iteration += 1
     assert clock.run_seconds == 118.25
     assert set(clock.seconds) == {*PHASES, *PAUSES}
+    counters.batches_refused += 2  # which were proposed and rendered for nothing
+    assert clock.run_seconds == 118.25 + 2 * (0.5 + 0.125 + 8)
 
 
 def test_methods_share_what_they_have_in_common() -> None:
@@ -150,6 +152,13 @@ def test_halves_have_costs_of_their_own_and_without_them_all_is_called_as_before
     whole, halves = keys(even), keys(even, "+renderer.halves=true")
     assert keys(even, "+renderer.halves=false") == whole
     assert not {*whole.values()} & {*halves.values()}
+
+
+def test_the_loss_whose_noise_halves_tell_is_part_of_the_price() -> None:
+    even, changed = "+renderer.samples_per_pixel=2", "loss.dssim_weight=0.5"
+    for halves, same in (("false", True), ("true", False)):
+        words = (even, f"+renderer.halves={halves}")
+        assert (keys(*words)["exploring"] == keys(*words, changed)["exploring"]) is same
 
 
 def test_patches_of_one_scene_are_rendered_at_a_price_of_their_own() -> None:

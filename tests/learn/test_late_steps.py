@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from ngi.reuse import (
     Epochs,
     FixedProbability,
     Never,
+    PolicyState,
     Prioritised,
     ProportionalToLoss,
     ReusePolicy,
@@ -207,7 +209,29 @@ POLICIES: dict[str, ReusePolicy] = {
     "fixed": FixedProbability(bootstrap_batches=3, probability=0.8),
     "self-tuning": SelfTuning(bootstrap_batches=3, beta=0.0, ema_coefficient=0.5),
 }
+
+
+class Largest(DrawingRule):
+    """Of one's own, which says nothing about losses."""
+
+    def draw(self, losses: Tensor, waiting: Tensor, count: int, *_) -> tuple[Tensor, Tensor]:
+        return losses.argsort(descending=True)[:count], waiting
+
+
+class WhereLossesAreLow(ReusePolicy):
+    """The same."""
+
+    def probability(self, state: PolicyState, *, generated_batches: int, **_) -> float:
+        return 0 if generated_batches < 3 else 1 / (1 + (state.existing_loss or 0))
+
+    def update(self, state: PolicyState, *, losses: Tensor, **rest) -> PolicyState:
+        state = super().update(state, losses=losses, **rest)
+        return replace(state, existing_loss=float(losses.mean()))
+
+
+POLICIES["of one's own"] = WhereLossesAreLow()
 RULES: dict[str, DrawingRule] = {
+    "of one's own": Largest(),
     "epochs": Epochs(),
     "in proportion": ProportionalToLoss(),
     "prioritised": Prioritised(alpha=0.6, beta=1.0, epsilon=0.01),

@@ -1,5 +1,6 @@
 """Lightning's shell around the training step changes nothing of it."""
 
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 from types import SimpleNamespace
@@ -7,7 +8,14 @@ from types import SimpleNamespace
 import pytest
 import torch
 
-from ngi.explore import LossTimesStep
+from ngi.explore import (
+    Acceptance,
+    Loss,
+    LossTimesStep,
+    MarkovChains,
+    NormalPerturbation,
+    Proposals,
+)
 from ngi.learn import (
     ExplorationDataModule,
     IlluminationModule,
@@ -22,7 +30,7 @@ from ngi.models import L1Dssim, MuonAdam, PixelGenerator
 from ngi.render import AnalyticRenderer
 from tests.learn.comparison import assert_same
 from tests.learn.lightning_warnings import IGNORED
-from tests.learn.small_stream import make
+from tests.learn.small_stream import answer, make
 
 pytestmark = IGNORED
 
@@ -78,6 +86,53 @@ def test_within_the_trainer_and_without_it_a_step_is_the_same(
     assert_same(shelled.state_dict(), bare.state_dict())
     assert_same(fit.optimizers[0].state_dict(), optimizer.state_dict())
     assert_same(within.state_dict(), without.state_dict())
+
+
+class Weighted(NormalPerturbation):
+    """A proposal of one's own that weights what it proposes."""
+
+    def propose(self, position, generator, *, batch: int) -> Proposals:
+        proposed = super().propose(position, generator, batch=batch)
+        return replace(proposed, weight=torch.full((len(position),), 4.0, dtype=torch.float64))
+
+
+def test_steps_of_weighted_losses_are_no_measure_of_where_chains_should_go(
+    tmp_path: Path,
+) -> None:
+    proposal = Weighted(large_step_probability=0.3, standard_deviation=0.05)
+    for target in (Loss(), LossTimesStep()):
+        stream = make(tmp_path / type(target).__name__, proposal=proposal, target=target)
+        bare = module(stream, tmp_path)
+        optimizer = bare.configure_optimizers()
+        batches = islice(stream, 2)
+        training_step(next(batches), bare.learner, optimizer=optimizer)
+        if isinstance(target, Loss):  # the first batch is where chains begin
+            assert next(batches).loss_weights is not None
+        else:
+            with pytest.raises(ValueError, match=r"sampler\.proposal: it weights the losses"):
+                training_step(next(batches), bare.learner, optimizer=optimizer)
+
+
+class Half(Acceptance):
+    """A rule of one's own, which does not say whether it looks at targets."""
+
+    def __call__(self, target_proposed, target_current, *_):
+        return target_proposed > 0.5 * target_current
+
+
+def test_a_rule_that_does_not_say_so_is_given_the_targets_of_current_states(
+    tmp_path: Path,
+) -> None:
+    sampler = MarkovChains(
+        chains=4,
+        proposal=NormalPerturbation(large_step_probability=0.3, standard_deviation=0.05),
+        target=Loss(),
+        acceptance=Half(),
+    )
+    stream = make(tmp_path, sampler=sampler)
+    for batch in islice(stream, 8):
+        stream.feedback(answer(batch))
+    assert stream.counters.scored_batches == stream.counters.generated_batches - 1 > 0
 
 
 def test_float16_is_refused(tmp_path: Path) -> None:

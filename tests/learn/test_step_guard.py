@@ -36,6 +36,7 @@ from ngi.learn.stream import TrainingStream
 from ngi.models import L1Dssim, MuonAdam, PixelGenerator
 from ngi.models.pixel_mlp import PixelMLP
 from ngi.render import AnalyticRenderer, RenderedPatches
+from tests.learn.late_training import Harm, Training
 from tests.learn.lightning_warnings import IGNORED
 from tests.learn.small_stream import make
 from tests.learn.test_step import module
@@ -154,6 +155,24 @@ def test_a_loss_that_is_not_finite_is_refused_and_names_its_patch(
     assert f"the loss of samples [1] (patches [5] of the store) is [{value}]" in caplog.text
     assert trained.stream.store.non_finite_losses == 1
     assert trained.weights[-1].isfinite().all()
+
+
+@pytest.mark.parametrize("late", [False, True])
+def test_a_step_that_is_refused_leaves_the_average_of_the_weights(
+    tmp_path: Path, late: bool
+) -> None:
+    def run(name: str, harm: Harm | None = None) -> Training:
+        training = Training(tmp_path / name, late=late, numbers={}, harm=harm)
+        training.run(10)
+        return training
+
+    generated = run("whole").generated
+    stored = generated.index(False) + 1
+    for harmed in (1, stored):
+        training = run(f"harmed {harmed}", Harm(loss={harmed: math.nan}))
+        assert training.stream.counters.steps_refused == 1
+        assert training.module.averaged is not None
+        assert training.module.averaged.n_averaged == 9
 
 
 def test_a_large_gradient_is_scaled_down_to_the_average_and_taken(tmp_path: Path) -> None:
