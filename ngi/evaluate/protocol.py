@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import math
 from dataclasses import asdict, dataclass
 
 import torch
@@ -69,6 +70,9 @@ class EvaluationProtocol:
         ):
             if getattr(self, key) < lowest:
                 raise ValueError(self._message(key, f"at least {lowest}"))
+        for key in FLOATS:
+            if not math.isfinite(getattr(self, key)):
+                raise ValueError(self._message(key, "a finite number"))
         for key in ("target_noise", "epsilon", "ssim_sigma"):
             if not getattr(self, key) > 0:
                 raise ValueError(self._message(key, "more than 0"))

@@ -7,7 +7,7 @@ channels:
     temporal error   sRGB       mean |Δs(f) - Δs(r)|
                      relative   mean |Δf - Δr| / (r̄ + ε)
     flicker          sRGB       mean |Δs(f)|
-                     relative   mean |Δf| / (f̄ + ε)
+                     relative   mean |Δf| / (max(f̄, 0) + ε)
 
 The first is the temporal term of the loss of Chaitanya et al. 2017 (Interactive Reconstruction of
 Monte Carlo Image Sequences using a Recurrent Denoising Autoencoder). An error that stays the same
@@ -96,4 +96,5 @@ class Flicker(_Sequence):
 
     def _measure(self, changes: Pictures, means: Pictures) -> dict[str, Tensor]:
         f, sf = changes
-        return {"srgb": sf.abs(), "relative": f.abs() / (means[0] + self._epsilon)}
+        # A network's radiance may be slightly negative.
+        return {"srgb": sf.abs(), "relative": f.abs() / (means[0].clamp(min=0) + self._epsilon)}

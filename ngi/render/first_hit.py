@@ -118,7 +118,10 @@ def first_hit_of(
     trace_direct: the direct light too, see `ngi.render.direct_light`.
     trace_caustics: in it the caustics.
     """
-    materials = collect_materials(scene.bsdfs())
+    try:
+        materials = collect_materials(scene.bsdfs())
+    except ValueError as error:
+        raise ValueError(f"{scene.description.document.path}: {error}") from None
     needs = buffer_needs(scene, materials)
     layout = needed_layout(needs) if needed_only else BufferLayout()
     if trace_direct and (direct_need(scene).needed or not needed_only):

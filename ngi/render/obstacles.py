@@ -26,5 +26,7 @@ def obstacles(scene: mi.Scene, *, document: SceneFile) -> list[str]:
         try:
             check()
         except ValueError as error:
-            found.append(str(error))
+            message = str(error)
+            known = message.startswith(str(document.path))
+            found.append(message if known else f"{document.path}: {message}")
     return list(dict.fromkeys(found))  # shapes share materials

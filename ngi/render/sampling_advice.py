@@ -85,4 +85,4 @@ def _moves_or_goes_out(variable: Variable) -> bool:
 
 def _polishes(variable: Variable) -> bool:
     """Whether it makes a surface smooth somewhere."""
-    return isinstance(variable, Roughness) and variable.minimum[0] <= SHINY
+    return isinstance(variable, Roughness) and min(variable.minimum + variable.maximum) <= SHINY

@@ -13,11 +13,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ngi.machine.backend import dr, mi
 from ngi.render.bounces import Branch, SpecularSurface, specular_surface
 from ngi.render.direct_light import emission
 from ngi.render.materials import Material, collect_materials, has_bsdf
+from ngi.scene.kinds import Roughness
 from ngi.scene.variable_scene import VariableScene
 
 SPECULAR_ROUGHNESS = 0.05
@@ -168,17 +170,26 @@ def _emission_along(
     )
 
 
+def _smoothest(scene: VariableScene) -> NDArray[np.float64]:
+    """[D]: v with every roughness at its least, which in releases may be where the range ends."""
+    v = np.zeros(scene.description.dimensions)
+    for variable, part in scene.description.parts():
+        if isinstance(variable, Roughness):
+            v[part] = variable.maximum < variable.minimum
+    return v
+
+
 def specular_chain(
     scene: VariableScene, materials: list[Material], *, direct: bool
 ) -> SpecularChain | None:
     """The chains of a scene, or None where nothing in it is specular at any v.
 
     No longer than the scene's paths: what lies beyond them emits nothing in its pictures. Leaves
-    the scene at v = 0.
+    the scene where it is smoothest.
 
     direct: see `SpecularChain`.
     """
-    scene.apply(np.zeros(scene.description.dimensions))  # every roughness at its minimum
+    scene.apply(_smoothest(scene))
     fronts = [material.front for material in materials]
     lowest = [m.front.constant_roughness for m in collect_materials([m.bsdf for m in fronts])]
     surfaces = [

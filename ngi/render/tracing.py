@@ -131,7 +131,7 @@ def bands(resolution: int, samples: int) -> list[Window]:
 
 def passes(samples: int, pixels: int) -> list[int]:
     """Samples per pixel of each launch: as few launches as `PATHS_PER_LAUNCH` allows, alike."""
-    count = -(-samples * pixels // PATHS_PER_LAUNCH)
+    count = min(samples, -(-samples * pixels // PATHS_PER_LAUNCH))
     return [samples // count + (i < samples % count) for i in range(count)]
 
 

@@ -25,6 +25,9 @@ STATIC = "ngi_static"
 _PLACED = ("instance", "shapegroup", "sphere", "rectangle", "disk", "cylinder")
 """Shapes that have a to_world, and groups."""
 
+_CARRIED = ("emitter", "sensor")
+"""What Mitsuba does not allow in groups."""
+
 
 WORTHWHILE = 100_000
 """Bytes of meshes that stay from which on they are put behind an instance."""
@@ -36,8 +39,8 @@ def arranged(
     """The same scene, arranged for these variables; as it is where no shape moves. Needs an active
     variant of Mitsuba.
 
-    Emitters stay where they are: Mitsuba does not allow them in groups. Ids are kept; that of a
-    mesh that became an instance is the instance's.
+    What carries an emitter or a sensor stays where it is: Mitsuba does not allow it in groups. Ids
+    are kept; that of a mesh that became an instance is the instance's.
     """
     moved = moving(variables)
     copied = document.copied()
@@ -46,11 +49,11 @@ def arranged(
     if not moved & {shape.get("id") for shape in shapes}:
         return document
     reshaped = {name for v in variables if isinstance(v, KeyFrames) for name in v.objects}
-    emitters = {emitter.get("id") for emitter in root.findall("emitter")}
+    carried = {each.get("id") for tag in _CARRIED for each in root.findall(tag)}
     static: list[ElementTree.Element] = []
     for shape in shapes:
         name, kind = shape.get("id"), shape.get("type")
-        if _emits(shape, emitters) or kind in ("instance", "shapegroup") or name in reshaped:
+        if _carries(shape, carried) or kind in ("instance", "shapegroup") or name in reshaped:
             continue
         if name not in moved:
             static.append(shape)
@@ -107,6 +110,11 @@ def moving(variables: Sequence[Variable]) -> set[str]:
     return moved
 
 
+def turning(variables: Sequence[Variable]) -> set[str]:
+    """Ids of what variables turn or scale."""
+    return {name for v in variables if isinstance(v, Rotation | Scale) for name in v.objects}
+
+
 def _mesh_size(document: SceneFile, shape: ElementTree.Element) -> int:
     """Bytes of the shape's file, 0 where it has none."""
     name = shape.find("string[@name='filename']")
@@ -114,9 +122,10 @@ def _mesh_size(document: SceneFile, shape: ElementTree.Element) -> int:
     return path.stat().st_size if path.is_file() else 0
 
 
-def _emits(shape: ElementTree.Element, emitters: set[str | None]) -> bool:
+def _carries(shape: ElementTree.Element, ids: set[str | None]) -> bool:
+    """Whether an emitter or a sensor is part of it. ids: of those that stand elsewhere."""
     references = {ref.get("id") for ref in shape.findall("ref")}
-    return shape.find("emitter") is not None or bool(references & emitters)
+    return any(shape.find(tag) is not None for tag in _CARRIED) or bool(references & ids)
 
 
 def _add_instance(

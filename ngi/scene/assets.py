@@ -97,7 +97,7 @@ def load_vertices(document: SceneFile, object_id: str, path: Path) -> tuple[Valu
 
 
 def _shape(document: SceneFile, object_id: str) -> ElementTree.Element:
-    shape = document.root.find(f".//shape[@id='{object_id}']")
+    shape = next((s for s in document.root.iter("shape") if s.get("id") == object_id), None)
     if shape is None:
         raise ValueError(
             f"{document.path}: no <shape id='{object_id}'> in the file itself; bring it there from "

@@ -102,6 +102,7 @@ class SceneDescription:
         views = np.array([variable.value(v[part]) for v in vectors]).reshape(-1, 6)
         origin, direction = views[:, :3], views[:, 3:] - views[:, :3]
         low, high = np.array(self.bounds)
+        direction[(direction == 0).all(axis=1)] = 0, 0, 1  # as `look_at` has it
         length = np.linalg.norm(direction, axis=1, keepdims=True)
         return np.hstack([(origin - low) / (high - low), direction / length])
 

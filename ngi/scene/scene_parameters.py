@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from pathlib import Path
 
 import numpy as np
@@ -46,10 +46,14 @@ class SceneParameters(Parameters):
 
     document: what the scene was loaded from.
     size: diagonal of the scene's box.
+    turning: ids of the objects that variables turn or scale
     """
 
-    def __init__(self, scene: mi.Scene, *, document: SceneFile, size: float) -> None:
+    def __init__(
+        self, scene: mi.Scene, *, document: SceneFile, size: float, turning: Set[str]
+    ) -> None:
         super().__init__(scene, document=document)
+        self._turning = turning
         self._size = size
         self._placements: dict[str, Placement] = {}
         self._emissions: dict[str, Emission] = {}
@@ -83,7 +87,8 @@ class SceneParameters(Parameters):
         """Whether it is in a group that an instance turns or scales: along other axes."""
         instances = [one for group, one in self.groups() if self.belongs_to(owner, group)]
         places = [np.array(mi.traverse(one)["to_world"].matrix) for one in instances]
-        return any(not np.allclose(p.reshape(4, 4)[:3, :3], np.eye(3)) for p in places)
+        authored = any(not np.allclose(p.reshape(4, 4)[:3, :3], np.eye(3)) for p in places)
+        return authored or any(one.id() in self._turning for one in instances)
 
     def _body(self, object_id: str, owner: mi.Object) -> Body:
         # Not every mi.Mesh is one of vertices: a rectangle has a to_world.

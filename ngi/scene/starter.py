@@ -37,7 +37,10 @@ def candidates(document: SceneFile, scene: mi.Scene) -> tuple[list[Candidate], i
     but have no id.
 
     document: the Mitsuba file, from which scene was loaded
+    Raises ValueError where there is no shape.
     """
+    if not scene.bbox().valid():
+        raise ValueError(f"{document.path}: it has no shape, so that there is nothing to see")
     hierarchy = mi.traverse(scene).hierarchy
     found: list[Candidate] = []
     nameless = 0
@@ -182,7 +185,7 @@ def _number(node: mi.Object, name: str) -> float:
 
 def _step(scene: mi.Scene) -> float:
     """A tenth of the scene's size."""
-    return round(float(np.linalg.norm(np.subtract(*_bounds(scene)))) / 10, 3)
+    return float(np.linalg.norm(np.subtract(*_bounds(scene)))) / 10
 
 
 def _offsets(step: float, up: Values) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ngi.machine.backend import mi
-from ngi.scene.arrangement import arranged, moving
+from ngi.scene.arrangement import arranged, moving, turning
 from ngi.scene.description import SceneDescription
 from ngi.scene.kinds import Material
 from ngi.scene.loading import load
@@ -37,6 +37,7 @@ class VariableScene:
             self.scene,
             document=document,
             size=float(np.linalg.norm(np.subtract(*description.bounds))),
+            turning=turning(description.variables),
         )
         self._reach = Reach(self.scene, description.bounds)
         self._reach.extend()

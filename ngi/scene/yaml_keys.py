@@ -4,6 +4,7 @@ import reprlib
 import sys
 from dataclasses import dataclass, field
 from difflib import get_close_matches
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -64,7 +65,7 @@ class YamlKeys:
         value = self.take(key, object)
         numbers = value if isinstance(value, list) else [value]
         if len(numbers) != length or not all(map(_is_finite_number, numbers)):
-            text = any(isinstance(number, str) and _is_number(number) for number in numbers)
+            text = any(isinstance(number, str) and _says_a_number(number) for number in numbers)
             hint = "; YAML reads 1e5 as text: write 1.0e+5" if text else ""
             raise self.error(key, value, f"expected {length} finite number(s){hint}")
         return tuple(map(float, numbers))
@@ -127,12 +128,11 @@ class YamlKeys:
             raise ValueError(f"{self.path}: unknown key '{self.prefix}{key}'; {advice}")
 
 
-def _is_number(text: str) -> bool:
+def _says_a_number(text: str) -> bool:
     try:
-        float(text)
+        return isfinite(float(text))
     except ValueError:
         return False
-    return True
 
 
 def _is_finite_number(value: object) -> bool:

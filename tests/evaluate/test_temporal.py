@@ -93,6 +93,12 @@ def test_flicker_of_normal_noise() -> None:
     assert flicker(frames[:1].repeat(3, 1, 1, 1)) == {"srgb": 0, "relative": 0}
 
 
+def test_flicker_where_a_network_is_slightly_below_black() -> None:
+    """Relative to black, not to what would change its sign."""
+    frames = torch.tensor([-0.0105, -0.0101]).reshape(2, 1, 1, 1).expand(2, 4, 4, 3)
+    assert flicker(frames)["relative"] == pytest.approx(0.0004 / EPSILON, rel=1e-3)
+
+
 def test_exposure_counts_for_what_is_shown_only() -> None:
     frames = 0.2 + 0.01 * noise(FRAMES, 8, 8, 3, seed=5)
     brighter = flicker(frames, exposure=1.0)

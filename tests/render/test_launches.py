@@ -14,6 +14,12 @@ def test_passes_are_few_and_alike(samples) -> None:
     assert len(sizes) == 1 or (len(sizes) - 1) * PATHS_PER_LAUNCH < samples * 32 * 32
 
 
+@pytest.mark.parametrize("samples", [1, 3])
+def test_no_pass_is_without_samples(samples) -> None:
+    """Of a picture of which one sample per pixel is more than a launch takes."""
+    assert passes(samples, 5 * PATHS_PER_LAUNCH) == [1] * samples
+
+
 @pytest.mark.parametrize(("resolution", "samples"), [(32, 1), (600, 16), (600, 256), (3000, 4096)])
 def test_bands_cover_the_image_once(resolution, samples) -> None:
     windows = bands(resolution, samples)

@@ -141,6 +141,7 @@ WRONG = [
     ("roughness", "minimum: 0.1, maximum: .inf", "maximum is inf; expected 1 finite"),
     ("roughness", "minimum: 0.1, maximum: true", "maximum is True; expected 1 finite"),
     ("roughness", "minimum: 0.1, maximum: 1e-1", "is '1e-1'; .*YAML reads 1e5 as text"),
+    ("roughness", "minimum: 0.1, maximum: inf", r"is 'inf'; expected 1 finite number\(s\)$"),
     ("roughness", "minimum: 0.1, maximum: 0.5, linked: true", "unknown key .*linked"),
     ("intensity", "minimum: -1, maximum: 2", r"minimum is \[-1.0\]; intensity"),
     (

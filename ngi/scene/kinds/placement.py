@@ -168,7 +168,9 @@ class KeyFrames(Variable):
             normals = None
             if n is not None and m is not None:
                 normals = n + weight * (m - n)
-                normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+                length = np.linalg.norm(normals, axis=1, keepdims=True)
+                near = n if weight < 0.5 else m  # where they point apart, and nothing is between
+                normals = np.where(length > 1e-6, normals / np.maximum(length, 1e-6), near)
             placement.reshape(positions, normals)
 
         return write

@@ -104,6 +104,30 @@ def test_what_a_scene_does_not_carry_guides_nothing() -> None:
     assert torch.equal(guides(missed, BufferLayout())[1], torch.zeros(4, 5, 3))
 
 
+@pytest.mark.parametrize("covered", [1.0, 0.75, 0.0625])
+def test_the_normal_of_a_pixel_that_a_surface_covers_in_part_is_that_share_of_its_own(
+    covered: float,
+) -> None:
+    """Buffers are means over a pixel's rays, and 0 for those that hit nothing."""
+    layout = BufferLayout()
+    normal, outgoing = (torch.tensor(n) for n in ([0.6, 0.0, -0.8], [0.0, -1.0, 0.0]))
+    buffers = torch.zeros(4, 5, layout.channels)
+    buffers[..., layout.slice("normal")] = covered * (normal / 2 + 0.5)
+    buffers[..., layout.slice("outgoing")] = covered * outgoing
+    found = guides(buffers, layout)[1]
+    torch.testing.assert_close(found, (covered * normal).expand(4, 5, 3))
+
+
+def test_rays_that_mirrors_lead_apart_are_not_taken_for_missed_ones() -> None:
+    layout = BufferLayout().adding(["throughput"])
+    normal = torch.tensor([0.6, 0.0, -0.8])
+    buffers = torch.zeros(4, 5, layout.channels)
+    buffers[..., layout.slice("normal")] = normal / 2 + 0.5
+    buffers[..., layout.slice("outgoing")] = 0.25
+    buffers[..., layout.slice("throughput")] = 0.9
+    torch.testing.assert_close(guides(buffers, layout)[1], normal.expand(4, 5, 3))
+
+
 @pytest.mark.parametrize("largest", [1, 2, 3, 7, 8, 100, 1000])
 def test_the_largest_number_that_fits_is_found(largest: int) -> None:
     tried: list[int] = []
