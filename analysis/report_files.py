@@ -72,14 +72,12 @@ def write_report(folder: Path, output: Path, *, baseline: str | None = None) -> 
     doubts = _doubts(runs, claims)
     notes = _notes(runs, claims, comparisons)
     films, unreadable = film_tables(folder, runs)
-    found, frames = claims_table(claims), frame_table(runs)
-    wide = [found, error_table(summaries), worst_table(summaries), cost_table(summaries)]
-    wide += [comparison_table(comparisons), frames, *films]
-    narrow = [found, frames, *_by_set(summaries, comparisons), cost_table(summaries), *films]
+    others = [claims_table(claims), frame_table(runs), cost_table(summaries), *films]
+    wide = _filled(others, _of_sets(summaries, comparisons, [SETS]))
+    narrow = _filled(others, _of_sets(summaries, comparisons, [[name] for name in SETS]))
     output.mkdir(parents=True, exist_ok=True)
-    doubtful = [*notes, *(f"Warning: {doubt}" for doubt in doubts)]
     files = _write_tables(summaries, runs, output)
-    files += _write_text(wide, narrow, doubtful, output)
+    files += _write_text(wide, narrow, [*notes, *(f"Warning: {doubt}" for doubt in doubts)], output)
     missing = []
     for scene in _progress(sorted({run.scene for run in runs}), "figures of scenes"):
         of_scene = [run for run in runs if run.scene == scene]
@@ -106,8 +104,8 @@ def write_report(folder: Path, output: Path, *, baseline: str | None = None) -> 
     )
     page = output / "index.html"
     write_page(contents, page, lambda parts: _progress(parts, "page"))
-    text = "\n\n".join([*map(to_terminal, _filled(narrow)), "\n".join(notes)])
-    return Report(text, [page, *files, *exploration], warnings)
+    text = [*map(to_terminal, narrow), "\n".join(notes)]
+    return Report("\n\n".join(text), [page, *files, *exploration], warnings)
 
 
 def _doubts(runs: Sequence[Run], claims: Sequence[ClaimResult]) -> list[str]:
@@ -130,16 +128,22 @@ def _progress(parts: Iterable[Any], what: str) -> Iterable[Any]:
     return tqdm(parts, desc=what, leave=False, disable=None)
 
 
-def _by_set(summaries: Sequence[Summary], comparisons: Sequence[Comparison]) -> Iterator[Table]:
-    """A set of frames at a time, which fits a terminal and a page."""
-    for name in SETS:
-        yield error_table(summaries, [name])
-        yield worst_table(summaries, [name])
-        yield comparison_table(comparisons, [name])
+def _of_sets(
+    summaries: Sequence[Summary],
+    comparisons: Sequence[Comparison],
+    parts: Iterable[Sequence[str]],
+) -> Iterator[Table]:
+    """Errors on some sets of frames at a time; one at a time fits a terminal and a page."""
+    for sets in parts:
+        yield error_table(summaries, sets)
+        yield worst_table(summaries, sets)
+        yield comparison_table(comparisons, sets)
 
 
-def _filled(tables: Iterable[Table]) -> list[Table]:
-    return [table for table in tables if table.rows]
+def _filled(others: Sequence[Table], of_sets: Iterable[Table]) -> list[Table]:
+    """All that have rows: the claims first, then errors, then the rest."""
+    claims, *rest = others
+    return [table for table in (claims, *of_sets, *rest) if table.rows]
 
 
 def _write_tables(summaries: Sequence[Summary], runs: Sequence[Run], output: Path) -> list[Path]:
@@ -155,9 +159,9 @@ def _write_text(
     """The wide tables and the notes as Markdown, the narrow ones as LaTeX."""
     markdown, latex = output / "results.md", output / "results.tex"
     lines = "\n".join(f"- {note}" for note in notes)
-    write(markdown, "\n\n".join([*map(to_markdown, _filled(wide)), lines]) + "\n")
+    write(markdown, "\n\n".join([*map(to_markdown, wide), lines]) + "\n")
     package = r"% for documents with \usepackage{booktabs}"
-    write(latex, "\n\n".join([package, *map(to_latex, _filled(narrow))]) + "\n")
+    write(latex, "\n\n".join([package, *map(to_latex, narrow)]) + "\n")
     return [markdown, latex]
 
 
