@@ -72,6 +72,8 @@ def _options(group: str, word: str) -> list[str]:
 def in_order(words: Sequence[str]) -> list[str]:
     """The words with -m before all others; argparse refuses overrides on both sides of an option.
 
+    A folder is quoted where Hydra would refuse it.
+
     Raises SystemExit, with a message, for an option that Hydra does not have, and for a sweep of
     which a single run is asked for.
     """
@@ -79,7 +81,7 @@ def in_order(words: Sequence[str]) -> list[str]:
     sweep = next((word for word in words if word.startswith("+sweeps=")), None)
     if sweep and not multirun and not any(word.partition("=")[0] in SHOWING for word in words):
         sys.exit(f"{sweep}: a sweep needs -m, as it has several runs; --dry-run only lists them")
-    ordered = [*multirun[:1], *(word for word in words if word not in MULTIRUN)]
+    ordered = [*multirun[:1], *(_quoted(word) for word in words if word not in MULTIRUN)]
     unknown = get_args_parser().parse_known_args(ordered)[1]
     if unknown and unknown[0].startswith("-"):
         name, _, value = unknown[0].lstrip("-").partition("=")
@@ -90,6 +92,14 @@ def in_order(words: Sequence[str]) -> list[str]:
     if unknown:
         sys.exit(f"{unknown[0]}: put options, such as -m, before all words without dashes")
     return ordered
+
+
+def _quoted(word: str) -> str:
+    """As it is, but for a folder with = in its name, as they have by themselves."""
+    key, _, folder = word.partition("=")
+    if key != "run.folder" or "=" not in folder or folder[0] in "'\"" or "'" in folder:
+        return word
+    return f"{key}='{folder}'"
 
 
 def with_overrides(words: Sequence[str], *overrides: str) -> list[str]:

@@ -25,7 +25,7 @@ from omegaconf.errors import OmegaConfBaseException
 from ngi.config.command_words import MULTIRUN, in_order
 from ngi.config.unread_output import readers_may_leave
 from ngi.files.extras import install_command
-from ngi.files.resources import config_groups, scene_places
+from ngi.files.resources import config_groups, config_options, scene_places
 
 LAUNCHERS = {"joblib": "joblib", "submitit_local": "slurm", "submitit_slurm": "slurm"}
 """Options of hydra/launcher that are packages of their own: the extra that each is in."""
@@ -73,6 +73,8 @@ def run_program(program: Callable[[], None], *, folder_option: str = "run.folder
     except (OSError, ValueError) as error:  # where Hydra makes the folder, or its log in there
         if str(error).startswith("Only one of --run"):
             sys.exit(f"{error}; to see the settings of one run of a sweep, leave out -m: --cfg job")
+        if str(error).startswith("Config group override must be"):
+            sys.exit(_about_number())
         cause = error if isinstance(error, OSError) else error.__cause__
         if not isinstance(cause, OSError):
             raise
@@ -150,14 +152,15 @@ def explained(error: Exception) -> str:
     cause = error.__cause__
     if isinstance(error, MissingConfigException) and error.options is not None:
         group, _, option = str(error.missing_cfg_file).rpartition("/")
-        near = get_close_matches(option, error.options, n=1)
+        options = config_options(group) or error.options
+        near = get_close_matches(option, options, n=1)
         group = "scene" if group.startswith("scene/") else group  # a path, not a name
         where = _about_scenes(option) if group == "scene" else ""
         if option in LAUNCHERS:
             where = f"; install it with {install_command(LAUNCHERS[option])}"
         return (
             f"{error.missing_cfg_file}: there is no such option; "
-            f"{group} can be {', '.join(error.options)}{where}{_question(near)}"
+            f"{group} can be {', '.join(options)}{where}{_question(near)}"
         )
     if isinstance(cause, AttributeError | KeyError) and isinstance(cause, OmegaConfBaseException):
         return _about_key(cause)
@@ -179,6 +182,16 @@ def _about_scenes(name: str) -> str:
         if (folder / "scene.xml").is_file():
             return f"; {folder} has no scene.yaml, `ngi describe {folder / 'scene.xml'}` writes one"
     return "; scenes are folders in ./scenes and $NGI_SCENES"
+
+
+def _about_number() -> str:
+    """Of the first word that gives a number, or true or false, to a group of options."""
+    for word in sys.argv[1:]:
+        group, _, value = word.lstrip("+").partition("=")
+        if group in config_groups() and re.match(r"[-+.\d]|(true|false)$", value, re.IGNORECASE):
+            break
+    hint = "; a number of seconds is budget.seconds=…" if group == "budget" else ""
+    return f"{word}: {group} can be {', '.join(config_options(group))}{hint}"
 
 
 def _about_word(error: OverrideParseException) -> str:

@@ -20,6 +20,11 @@ def config_groups() -> set[str]:
     return {folder.name for folder in (root() / "conf").iterdir() if folder.is_dir()}
 
 
+def config_options(group: str) -> list[str]:
+    """What can be chosen for a group, or for a folder in one, such as `method/ours_without`."""
+    return sorted(file.stem for file in (root() / "conf" / group).glob("*.yaml"))
+
+
 def scene_places() -> list[Path]:
     """Folders of scene folders: of the shipped scenes, ./scenes, and those in $NGI_SCENES."""
     named = os.environ.get("NGI_SCENES", "").split(os.pathsep)

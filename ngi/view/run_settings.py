@@ -5,6 +5,7 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -73,9 +74,9 @@ def read_settings(folder: Path) -> dict[str, Any]:
     """The run's settings.json; FileNotFoundError where there is none, ValueError if damaged."""
     path = folder / "settings.json"
     if not path.exists():
-        raise FileNotFoundError(
-            f"{path}: no such file; name the folder of one run, outputs/…/seed=0 for example"
-        )
+        below = [str(file.parent) for file in islice(folder.rglob("settings.json"), 3)]
+        such = " or ".join(below) or "outputs/…/seed=0 for example"
+        raise FileNotFoundError(f"{path}: no such file; name the folder of one run, {such}")
     with damage_named(path):
         settings: dict[str, Any] = json.loads(path.read_text())
     return settings

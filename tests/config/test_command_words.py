@@ -101,6 +101,27 @@ def test_an_option_may_stand_among_overrides() -> None:
 
 
 @pytest.mark.parametrize(
+    ("folder", "word"),
+    [
+        ("outputs/method=x,seed=0", "'outputs/method=x,seed=0'"),
+        ("'outputs/seed=0'", "'outputs/seed=0'"),
+        ('"outputs/seed=0"', '"outputs/seed=0"'),
+        ("outputs/a,outputs/b", "outputs/a,outputs/b"),  # a sweep's
+        ("outputs/${seed}", "outputs/${seed}"),
+        ("", ""),
+    ],
+)
+def test_a_folder_that_hydra_would_refuse_is_quoted(folder: str, word: str) -> None:
+    assert in_order([f"run.folder={folder}", "a=b=c"]) == [f"run.folder={word}", "a=b=c"]
+
+
+def test_a_folder_may_be_named_as_runs_name_it(tmp_path: Path) -> None:
+    status, output = run(tmp_path, "run.folder=outputs/method=x,y/seed=0")
+    assert status == 0, output
+    assert (tmp_path / "outputs/method=x,y/seed=0/result.json").is_file()
+
+
+@pytest.mark.parametrize(
     ("words", "message"),
     [
         (["a=b", "--budget", "small"], "--budget: there is no such option; .*: budget=…"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -41,6 +42,7 @@ from tests.learn.command_line import SMALL, run, run_module
             "optimizer/adm: there is no such option; optimizer can be adam, adam_exploration_map, "
             "adam_small, adam_tuned, muon; did you mean 'adam'?",
         ),
+        ("method=ours_without/caustic", "; did you mean 'caustics'?"),
         ("+sweeps=xyz", "sweeps/xyz: there is no such option; sweeps can be acceptance, anf, "),
         ("seed", "'seed': write key=value, without spaces around the ="),
         ("seed=[1", "'seed=[1': no viable alternative at input '[1'"),
@@ -56,6 +58,23 @@ def test_of_what_does_not_exist_the_nearest_is_named(word: str, message: str) ->
     with pytest.raises(HydraException) as raised:
         composed("renderer=analytic", word)
     assert message in explained(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("word", "message"),
+    [
+        ("budget=60", "budget=60: budget can be hour, .*; a number of seconds is budget.seconds=…"),
+        ("resolution=128", "resolution=128: resolution can be constant, growing$"),
+        ("+method=true", "method=true: method can be active_exploration, "),
+    ],
+)
+def test_a_number_where_an_option_is_chosen_is_answered_by_the_options(
+    tmp_path: Path, word: str, message: str
+) -> None:
+    status, output = run(tmp_path, word, base=())
+    assert status == 1
+    assert re.search(message, output.strip())
+    assert "Traceback" not in output
 
 
 @pytest.mark.parametrize("place", [".", "elsewhere"])

@@ -87,6 +87,20 @@ def test_where_the_scene_is_is_no_part_of_the_identity(tmp_path, monkeypatch) ->
     assert (folder / "settings.json").read_text() == identity
 
 
+def test_of_a_folder_of_runs_some_are_named(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match=r"name the folder of one run, outputs/…/seed=0"):
+        open_run(tmp_path)
+    for seed in range(4):
+        folder = tmp_path / "mirror" / f"seed={seed}"
+        folder.mkdir(parents=True)
+        (folder / "settings.json").touch()
+    with pytest.raises(FileNotFoundError) as raised:
+        open_run(tmp_path)
+    named = str(raised.value).partition("the folder of one run, ")[2].split(" or ")
+    assert len(named) == 3
+    assert {*named} < {str(tmp_path / "mirror" / f"seed={seed}") for seed in range(4)}
+
+
 @pytest.mark.parametrize("content", ["[]", "{}", "3", '{"scene": 3}'])
 @pytest.mark.parametrize("open_folder", [TrainedRun.open, PathTracedRun.open, open_run])
 def test_settings_that_are_no_runs_are_named(
