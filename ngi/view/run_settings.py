@@ -5,7 +5,7 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
@@ -74,8 +74,9 @@ def read_settings(folder: Path) -> dict[str, Any]:
     """The run's settings.json; FileNotFoundError where there is none, ValueError if damaged."""
     path = folder / "settings.json"
     if not path.exists():
-        below = [str(file.parent) for file in islice(folder.rglob("settings.json"), 3)]
-        such = " or ".join(below) or "outputs/…/seed=0 for example"
+        below = (folder.glob("*/" * depth + path.name) for depth in range(1, 5))
+        some = islice(chain.from_iterable(below), 3)
+        such = " or ".join(str(file.parent) for file in some) or "outputs/…/seed=0 for example"
         raise FileNotFoundError(f"{path}: no such file; name the folder of one run, {such}")
     with damage_named(path):
         settings: dict[str, Any] = json.loads(path.read_text())
