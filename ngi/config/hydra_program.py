@@ -152,7 +152,8 @@ def explained(error: Exception) -> str:
     cause = error.__cause__
     if isinstance(error, MissingConfigException) and error.options is not None:
         group, _, option = str(error.missing_cfg_file).rpartition("/")
-        options = config_options(group) or error.options
+        # of a folder in a group Hydra lists what the group has
+        options = (config_options(group) if "/" in group else []) or error.options
         near = get_close_matches(option, options, n=1)
         group = "scene" if group.startswith("scene/") else group  # a path, not a name
         where = _about_scenes(option) if group == "scene" else ""

@@ -66,6 +66,7 @@ def test_of_what_does_not_exist_the_nearest_is_named(word: str, message: str) ->
         ("budget=60", "budget=60: budget can be hour, .*; a number of seconds is budget.seconds=…"),
         ("resolution=128", "resolution=128: resolution can be constant, growing$"),
         ("+method=true", "method=true: method can be active_exploration, "),
+        ("scene=3", "scene=3: scene can be archviz, .*, mirror, "),
     ],
 )
 def test_a_number_where_an_option_is_chosen_is_answered_by_the_options(
