@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -72,9 +72,9 @@ def write_report(folder: Path, output: Path, *, baseline: str | None = None) -> 
     doubts = _doubts(runs, claims)
     notes = _notes(runs, claims, comparisons)
     films, unreadable = film_tables(folder, runs)
-    others = [claims_table(claims), frame_table(runs), cost_table(summaries), *films]
-    wide = _filled(others, _of_sets(summaries, comparisons, [SETS]))
-    narrow = _filled(others, _of_sets(summaries, comparisons, [[name] for name in SETS]))
+    found, rest = claims_table(claims), [frame_table(runs), cost_table(summaries), *films]
+    wide = _filled([found, *_of_sets(summaries, comparisons, SETS), *rest])
+    narrow = _filled([found, *_by_set(summaries, comparisons), *rest])
     output.mkdir(parents=True, exist_ok=True)
     files = _write_tables(summaries, runs, output)
     files += _write_text(wide, narrow, [*notes, *(f"Warning: {doubt}" for doubt in doubts)], output)
@@ -129,21 +129,20 @@ def _progress(parts: Iterable[Any], what: str) -> Iterable[Any]:
 
 
 def _of_sets(
-    summaries: Sequence[Summary],
-    comparisons: Sequence[Comparison],
-    parts: Iterable[Sequence[str]],
-) -> Iterator[Table]:
-    """Errors on some sets of frames at a time; one at a time fits a terminal and a page."""
-    for sets in parts:
-        yield error_table(summaries, sets)
-        yield worst_table(summaries, sets)
-        yield comparison_table(comparisons, sets)
+    summaries: Sequence[Summary], comparisons: Sequence[Comparison], sets: Sequence[str]
+) -> list[Table]:
+    """Errors on these sets of frames."""
+    errors = [error_table(summaries, sets), worst_table(summaries, sets)]
+    return [*errors, comparison_table(comparisons, sets)]
 
 
-def _filled(others: Sequence[Table], of_sets: Iterable[Table]) -> list[Table]:
-    """All that have rows: the claims first, then errors, then the rest."""
-    claims, *rest = others
-    return [table for table in (claims, *of_sets, *rest) if table.rows]
+def _by_set(summaries: Sequence[Summary], comparisons: Sequence[Comparison]) -> list[Table]:
+    """One set of frames at a time, which fits a terminal and a page."""
+    return [table for name in SETS for table in _of_sets(summaries, comparisons, [name])]
+
+
+def _filled(tables: Iterable[Table]) -> list[Table]:
+    return [table for table in tables if table.rows]
 
 
 def _write_tables(summaries: Sequence[Summary], runs: Sequence[Run], output: Path) -> list[Path]:

@@ -18,7 +18,7 @@ from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.override_parser.types import Glob
 from hydra.errors import HydraException
 
-from ngi.files.resources import root
+from ngi.files.resources import config_options
 
 MULTIRUN = ("-m", "--multirun")
 SHOWING = ("-c", "--cfg", "-i", "--info", "-h", "--help", "--hydra-help")
@@ -63,7 +63,7 @@ def _options(group: str, word: str) -> list[str]:
         return []
     value: Any = override.value()
     if isinstance(value, Glob):
-        return value.filter([file.stem for file in (root() / "conf" / group).glob("*.yaml")])
+        return value.filter(config_options(group))
     if override.is_discrete_sweep():
         return [name.strip("'\"") for name in override.sweep_string_iterator()]
     return [str(value)]

@@ -74,7 +74,7 @@ def run_program(program: Callable[[], None], *, folder_option: str = "run.folder
         if str(error).startswith("Only one of --run"):
             sys.exit(f"{error}; to see the settings of one run of a sweep, leave out -m: --cfg job")
         if str(error).startswith("Config group override must be"):
-            sys.exit(_about_number())
+            sys.exit(_about_number(error))
         cause = error if isinstance(error, OSError) else error.__cause__
         if not isinstance(cause, OSError):
             raise
@@ -185,14 +185,16 @@ def _about_scenes(name: str) -> str:
     return "; scenes are folders in ./scenes and $NGI_SCENES"
 
 
-def _about_number() -> str:
-    """Of the first word that gives a number, or true or false, to a group of options."""
+def _about_number(error: Exception) -> str:
+    """error: of the first word that gives a number, or true or false, to a group of options; where
+    there is none, it is in a file.
+    """
     for word in sys.argv[1:]:
         group, _, value = word.lstrip("+").partition("=")
         if group in config_groups() and re.match(r"[-+.\d]|(true|false)$", value, re.IGNORECASE):
-            break
-    hint = "; a number of seconds is budget.seconds=…" if group == "budget" else ""
-    return f"{word}: {group} can be {', '.join(config_options(group))}{hint}"
+            hint = "; a number of seconds is budget.seconds=…" if group == "budget" else ""
+            return f"{word}: {group} can be {', '.join(config_options(group))}{hint}"
+    return str(error)
 
 
 def _about_word(error: OverrideParseException) -> str:

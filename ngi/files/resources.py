@@ -23,9 +23,7 @@ def config_groups() -> set[str]:
 def config_options(group: str) -> list[str]:
     """What can be chosen for a group, or for a folder in one, such as `method/ours_without`."""
     found = {file.stem for file in (root() / "conf" / group).glob("*.yaml")}
-    if group == "scene":
-        found |= {file.parent.name for at in scene_places() for file in at.glob("*/scene.yaml")}
-    return sorted(found)
+    return sorted(found.union(scene_folders() if group == "scene" else ()))
 
 
 def scene_places() -> list[Path]:

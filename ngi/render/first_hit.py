@@ -11,7 +11,7 @@ from ngi.machine.backend import dr, mi
 from ngi.patches import BufferLayout
 from ngi.render.caustics import Caustics, caustics_of
 from ngi.render.direct_light import direct_light, emission
-from ngi.render.materials import Material, collect_materials, evaluate_materials
+from ngi.render.materials import Material, evaluate_materials, materials_in
 from ngi.render.needs import buffer_needs, direct_need, needed_layout
 from ngi.render.specular import ChainEnd, SpecularChain, specular_chain
 from ngi.scene.variable_scene import VariableScene
@@ -118,10 +118,7 @@ def first_hit_of(
     trace_direct: the direct light too, see `ngi.render.direct_light`.
     trace_caustics: in it the caustics.
     """
-    try:
-        materials = collect_materials(scene.bsdfs())
-    except ValueError as error:
-        raise ValueError(f"{scene.description.document.path}: {error}") from None
+    materials = materials_in(scene.description.document, scene.bsdfs())
     needs = buffer_needs(scene, materials)
     layout = needed_layout(needs) if needed_only else BufferLayout()
     if trace_direct and (direct_need(scene).needed or not needed_only):

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ngi.machine.backend import dr, mi
+from ngi.scene.scene_files import SceneFile
 
 Lookup = Callable[..., Any]
 """(hit: SurfaceInteraction3f, active: Bool) -> Color3f or Float."""
@@ -47,6 +48,14 @@ class Material:
 def collect_materials(bsdfs: list[mi.BSDF]) -> list[Material]:
     """The materials of BSDFs; ValueError for a BSDF of a kind that is not known."""
     return [_material(bsdf) for bsdf in bsdfs]
+
+
+def materials_in(document: SceneFile, bsdfs: list[mi.BSDF]) -> list[Material]:
+    """As `collect_materials` of what a file has, which the error names."""
+    try:
+        return collect_materials(bsdfs)
+    except ValueError as error:
+        raise ValueError(f"{document.path}: {error}") from None
 
 
 def evaluate_materials(

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 
 from ngi.machine.backend import mi
-from ngi.render.materials import collect_materials
+from ngi.render.materials import materials_in
 from ngi.render.projection import require_perspective
 from ngi.scene.scene_files import SceneFile
 from ngi.scene.scene_parameters import has_surface
@@ -20,13 +20,11 @@ def obstacles(scene: mi.Scene, *, document: SceneFile) -> list[str]:
 
     surfaces = [shape.bsdf() for shape in scene.shapes() if has_surface(shape)]
     checks: list[Callable[[], object]] = [camera]
-    checks += [partial(collect_materials, [bsdf]) for bsdf in surfaces]
+    checks += [partial(materials_in, document, [bsdf]) for bsdf in surfaces]
     found = []
     for check in checks:
         try:
             check()
         except ValueError as error:
-            message = str(error)
-            known = message.startswith(str(document.path))
-            found.append(message if known else f"{document.path}: {message}")
+            found.append(str(error))
     return list(dict.fromkeys(found))  # shapes share materials

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from ngi.files.durable import write_atomically
-from ngi.render.materials import collect_materials
+from ngi.render.materials import materials_in
 from ngi.render.needs import buffer_needs, buffers_are_static, direct_need, needed_layout
 from ngi.render.obstacles import obstacles
 from ngi.render.projection import require_perspective
@@ -36,7 +36,7 @@ def describe_scene(description: SceneDescription) -> tuple[str, list[str]]:
             f"  {numbers:>9}  {names[0]}{f' ({parts})' if parts else ''}: {variable.range}"
         )
     lines += ["", "buffers:"]
-    materials = collect_materials(scene.bsdfs())
+    materials = materials_in(description.document, scene.bsdfs())
     needs = buffer_needs(scene, materials)
     for need in needs:
         lines.append(f"  {need.buffer:>9}  {'kept' if need.needed else 'left out'}: {need.why}")
